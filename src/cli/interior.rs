@@ -1,34 +1,39 @@
 //! `lumigraph interior`
 
+mod folder;
 mod told;
+mod warnings;
 
 use super::Usage;
-use super::made;
 use super::options::{HoldOutArgs, triple};
 use super::output::{print, say};
 use super::session::spinner;
-use super::targets::{check_new_folder, holder};
+use super::targets::check_new_folder;
 use anyhow::{Context, bail};
-use calibrate::{Distortion, colmap};
-use capture::as_argument;
+use calibrate::Distortion;
 use datasets::in_new_folder;
+pub(super) use folder::{
+    INTERIOR, check_holds_none, check_no_interior, check_outside, check_there, is_interior,
+    is_without_photos, open,
+};
+use folder::{PLAN_PNG, PLAN_SVG, beside_interior, is_ours};
 use glam::DVec3;
 use image::ImageFormat;
 use lumigraph::scene::{Scene, relative};
 use proxy::interior::find::{Evidence, FindOptions, FoundInterior, find_interior};
 use proxy::interior::{
-    Contents, EYE_HEIGHT, Interior, InteriorError, InteriorFileError, InteriorWarning, compare,
-    fit_to_sight, interior_from_nodes, read_interior, strays, surface_of, write_interior,
+    Contents, EYE_HEIGHT, Interior, InteriorError, InteriorWarning, compare, fit_to_sight,
+    interior_from_nodes, strays, surface_of, write_interior,
 };
 use proxy::mesh::{MeshFileError, Model, files_beside, model_to_glb, parse_model};
 use proxy::shown_name;
-use std::collections::{BTreeSet, HashMap};
-use std::ffi::OsString;
+use std::collections::BTreeSet;
 use std::io::Cursor;
-use std::mem::discriminant;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use told::{Told, model_name};
+use warnings::put_causes_first;
+pub(super) use warnings::said;
 
 /// Make an interior of a model or a capture: cells joined by portals
 ///
@@ -84,8 +89,6 @@ pub(super) struct Args {
 const SAME_PORTAL: f64 = 0.3;
 /// Rooms and portals reach farther by this at most to have what is seen; metres.
 const WALL: f64 = 0.35;
-/// Of so many cells or portals the same is said one by one: where the scale is wrong, it is true of most.
-const MAX_ALIKE: usize = 16;
 /// What a capture's model is called.
 const MODEL: &str = "model.glb";
 
@@ -311,42 +314,6 @@ fn run_model(args: &Args, options: &FindOptions, told: Told) -> anyhow::Result<(
     finish(args, &file, &bytes, &model, rooms, told.known)
 }
 
-/// Puts what may be wrong with the scale before all else, and what is said of single cells and portals, many of them
-/// where it is wrong, after.
-fn put_causes_first(warnings: &mut [InteriorWarning]) {
-    use InteriorWarning::{Away, NoPortal, Overlap, TallWalls, Turned, UpsideDown};
-    warnings.sort_by_key(|warning| match warning {
-        TallWalls(_) | UpsideDown(_) => 0,
-        NoPortal(_) => 3,
-        Overlap(..) | Away { .. } | Turned(_) => 2,
-        _ => 1,
-    });
-}
-
-/// Warnings in words, in order. Where there are many of a kind the last that is told has how many more there are; of
-/// overlaps all are told, as no more than some are looked for.
-pub(super) fn said(warnings: &[InteriorWarning]) -> Vec<String> {
-    let mut counts = HashMap::new();
-    for warning in warnings {
-        *counts.entry(discriminant(warning)).or_insert(0_usize) += 1;
-    }
-    let mut texts = Vec::new();
-    let mut before = HashMap::new();
-    for warning in warnings {
-        let kind = discriminant(warning);
-        let number = before.entry(kind).or_insert(0_usize);
-        *number += 1;
-        let is_overlap = matches!(warning, InteriorWarning::Overlap(..));
-        let more = counts[&kind].saturating_sub(MAX_ALIKE);
-        if is_overlap || more == 0 || *number < MAX_ALIKE {
-            texts.push(warning.to_string());
-        } else if *number == MAX_ALIKE {
-            texts.push(format!("{warning} (and {more} more of this kind)"));
-        }
-    }
-    texts
-}
-
 /// What was found with all of the model in sight that is.
 fn fitted(
     mut found: FoundInterior,
@@ -463,207 +430,4 @@ fn write(
         }
         Ok(write_interior(&folder.join(INTERIOR), interior)?)
     })
-}
-
-/// To check found rooms by.
-const PLAN_SVG: &str = "floor-plan.svg";
-const PLAN_PNG: &str = "floor-plan.png";
-/// The interior's own file in its folder.
-pub(super) const INTERIOR: &str = "interior.json";
-
-/// How to come by an interior, for who gave something else.
-const REMEDY: &str = "`lumigraph interior CAPTURE_OR_GLB -o DIR` makes one";
-
-/// Opens an interior, its folder or its file, says what is odd, and where the file is.
-pub(super) fn open(given: &Path) -> anyhow::Result<(PathBuf, Interior)> {
-    check_there(given)?;
-    let path = file_of(given);
-    if !path.exists() {
-        bail!(
-            "{}: no interior, as it holds no {INTERIOR}; {REMEDY}",
-            given.display()
-        );
-    }
-    // Of a file of that name it says where the slip is.
-    let is_named = path.file_name().is_some_and(|name| name == INTERIOR);
-    let (interior, warnings) = match read_interior(&path) {
-        Err(error @ InteriorFileError::Json(..)) if !is_named => bail!("{error}; {REMEDY}"),
-        read => read?,
-    };
-    for warning in said(&warnings) {
-        say!("warning: {warning}");
-    }
-    Ok((path, interior))
-}
-
-/// The file of an interior that is given by its folder or its file.
-fn file_of(given: &Path) -> PathBuf {
-    match given.is_dir() {
-        true => given.join(INTERIOR),
-        false => given.to_owned(),
-    }
-}
-
-/// Whether an interior, given by its folder or its file, can be read and has no photos to be drawn from.
-pub(super) fn is_without_photos(given: &Path) -> bool {
-    let read = read_interior(&file_of(given));
-    read.is_ok_and(|(interior, _)| interior.cells.iter().all(|c| c.content.scene().is_none()))
-}
-
-/// Fails where there is nothing at a path.
-pub(super) fn check_there(given: &Path) -> anyhow::Result<()> {
-    if !given.exists() {
-        bail!(
-            "{}: there is no such file or folder; check the path",
-            given.display()
-        );
-    }
-    Ok(())
-}
-
-/// Fails where photos are expected, and an interior is given: its folder, unless that holds photos
-/// or a scene as well, or its file.
-pub(super) fn check_no_interior(given: &Path) -> anyhow::Result<()> {
-    let is_file = given.is_file() && given.file_name().is_some_and(|name| name == INTERIOR);
-    let holds_photos = || {
-        let is_capture = given.join("images").is_dir() || colmap::find_model(given).is_ok();
-        is_capture || Scene::is_scene(given)
-    };
-    if is_file || (given.join(INTERIOR).is_file() && !holds_photos()) {
-        let argument = as_argument(given);
-        let given = given.display();
-        bail!(
-            "{given}: this is an interior, not photos; `lumigraph walk {argument} -o FRAMES` is for it"
-        );
-    }
-    Ok(())
-}
-
-/// Fails where a folder for something else holds an interior, which could not be replaced beside that.
-pub(super) fn check_holds_none(folder: &Path) -> anyhow::Result<()> {
-    if folder.join(INTERIOR).is_file() {
-        bail!(
-            "{}: this folder holds an interior, and what else lies there keeps it from being replaced; choose \
-             another -o",
-            folder.display()
-        );
-    }
-    Ok(())
-}
-
-/// Fails where something else, a file or a folder of files, is to be written into the folder of an interior that
-/// could be replaced, however far below: it could not be any more. The option names it.
-pub(super) fn check_outside(path: &Path, option: &str) -> anyhow::Result<()> {
-    if let Some(holder) = holder(path, is_ours) {
-        bail!(
-            "{}: {} holds an interior, and what else lies there keeps it from being replaced; choose another {option}",
-            path.display(),
-            holder.display()
-        );
-    }
-    Ok(())
-}
-
-/// Whether an interior is given to what opens others, too: a folder that holds one, or its file.
-pub(super) fn is_interior(given: &Path) -> bool {
-    given.join(INTERIOR).is_file() || given.file_name().is_some_and(|name| name == INTERIOR)
-}
-
-/// Whether a folder holds an interior and nothing else.
-fn is_ours(folder: &Path) -> bool {
-    folder.join(INTERIOR).exists() && matches!(beside_interior(folder), Ok(None))
-}
-
-/// What a folder holds besides an interior, one model and perhaps a floor plan, LDIs and what `generate` says of its
-/// house: the first thing by name, for people.
-fn beside_interior(folder: &Path) -> anyhow::Result<Option<String>> {
-    let entries = std::fs::read_dir(folder)
-        .and_then(|entries| entries.map(|e| e.map(|e| e.file_name())).collect());
-    let mut names: Vec<OsString> =
-        entries.with_context(|| format!("{}: cannot read", folder.display()))?;
-    names.sort();
-    let is_known = |name: &OsString, path: &Path| {
-        let is_own = name == INTERIOR || name == PLAN_SVG || name == PLAN_PNG;
-        is_own || (name == README && is_generated(path))
-    };
-    let mut models = Vec::new();
-    for name in &names {
-        let (path, shown) = (folder.join(name), name.to_string_lossy());
-        if name == made::FOLDER {
-            if let Some(other) = made::beside_ldis(&path) {
-                let other = other.strip_prefix(folder).unwrap_or(&other);
-                return Ok(Some(other.display().to_string()));
-            }
-        } else if path.extension().is_some_and(|e| e == "glb") {
-            models.push(shown);
-        } else if !is_known(name, &path) {
-            return Ok(Some(shown.into_owned()));
-        }
-    }
-    Ok((models.len() > 1).then(|| format!("{} models ({})", models.len(), models.join(", "))))
-}
-
-/// What `generate house` says of itself.
-const README: &str = "README.md";
-const README_BEGINS: &str = "# house\n\n- Source: `lumigraph generate house`, a procedural house.";
-const README_LINES: usize = 5;
-
-/// Whether a file is what `generate house` wrote, and nobody has added to it.
-fn is_generated(file: &Path) -> bool {
-    let text = std::fs::read_to_string(file).unwrap_or_default();
-    text.starts_with(README_BEGINS) && text.lines().count() == README_LINES
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_may_be_wrong_with_all_is_told_before_what_follows_from_it() {
-        let alone = |name: &str| InteriorWarning::NoPortal(name.to_owned());
-        let tall = InteriorWarning::TallWalls(25.0);
-        let storey = InteriorWarning::Storey(3.0);
-        let mut warnings = vec![
-            alone("room 1"),
-            alone("room 2"),
-            tall.clone(),
-            storey.clone(),
-        ];
-        put_causes_first(&mut warnings);
-        let expected = [
-            tall.clone(),
-            storey.clone(),
-            alone("room 1"),
-            alone("room 2"),
-        ];
-        assert_eq!(warnings, expected);
-        let turned = InteriorWarning::Turned("door".to_owned());
-        let mut warnings = [
-            alone("room 1"),
-            turned.clone(),
-            storey.clone(),
-            tall.clone(),
-        ];
-        put_causes_first(&mut warnings);
-        assert_eq!(warnings, [tall, storey, turned, alone("room 1")]);
-    }
-
-    #[test]
-    fn of_many_warnings_of_a_kind_the_first_are_said_and_how_many_more_there_are() {
-        let alone = |i: usize| InteriorWarning::NoPortal(format!("room {i}"));
-        let mut warnings: Vec<InteriorWarning> = (0..MAX_ALIKE).map(alone).collect();
-        let each = |warnings: &[InteriorWarning]| -> Vec<String> {
-            warnings.iter().map(|w| w.to_string()).collect()
-        };
-        assert_eq!(said(&warnings), each(&warnings));
-        let first = each(&warnings);
-        warnings.extend((0..84).map(|i| alone(MAX_ALIKE + i)));
-        warnings.push(InteriorWarning::Elsewhere(7));
-        let texts = said(&warnings);
-        assert_eq!(texts.len(), MAX_ALIKE + 1);
-        assert_eq!(texts[..MAX_ALIKE - 1], first[..MAX_ALIKE - 1]);
-        let last = format!("{} (and 84 more of this kind)", first[MAX_ALIKE - 1]);
-        assert_eq!(texts[MAX_ALIKE - 1], last);
-        assert!(texts[MAX_ALIKE].starts_with("7 triangles"));
-    }
 }

@@ -33,6 +33,22 @@ fn the_folder_one_stands_in_is_filled_and_replaced_like_any_other() {
 }
 
 #[test]
+fn a_models_name_may_end_in_capitals() {
+    let folder = with_house();
+    let here = folder.path();
+    std::fs::write(here.join("rooms.json"), ROOMS).unwrap();
+    std::fs::copy(here.join("house/house.glb"), here.join("HOUSE.GLB")).unwrap();
+    let line = "interior HOUSE.GLB --rooms rooms.json -o one";
+    lumigraph(here, line).ok();
+    let expected = files(&here.join("one"));
+    lumigraph(here, &format!("{line} --force")).ok();
+    assert!(files(&here.join("one")) == expected);
+    let walk = "walk one --tour --frames 1 --size 16x16 -o one/frames";
+    let error = lumigraph(here, walk).error(1);
+    assert!(error.contains("one holds an interior"), "{error}");
+}
+
+#[test]
 fn a_generated_house_is_replaced_with_what_it_says_of_itself_and_nothing_of_ones_own() {
     let folder = with_house();
     let here = folder.path();
