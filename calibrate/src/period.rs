@@ -8,6 +8,7 @@
 //! minimisation, Stellingwerf 1978, with lags in the place of times).
 
 use glam::DVec3;
+use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::ops::RangeInclusive;
 
@@ -128,9 +129,9 @@ struct Pair {
 /// # Panics
 /// If the photos do not all list the same number of places.
 pub fn find_period(snapshots: &[Snapshot]) -> Result<Period, PeriodError> {
-    // 1. In an order of their own: that of time.
+    // 1. In an order of their own: that of time, and of what was taken at once, of colours and places.
     let mut sorted: Vec<&Snapshot> = snapshots.iter().collect();
-    sorted.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    sorted.sort_by(|a, b| in_own_order(a, b));
     let times_s: Vec<f64> = sorted.iter().map(|s| s.time_s).collect();
     let Candidates {
         frequencies_hz: candidates,
@@ -194,6 +195,16 @@ pub fn find_period(snapshots: &[Snapshot]) -> Result<Period, PeriodError> {
         longer_s: longer.period_s,
         of_longer: longer.explained,
     })
+}
+
+/// By time, then by what else there is to tell them apart; what they show first, as that is the same in any world.
+fn in_own_order(a: &Snapshot, b: &Snapshot) -> Ordering {
+    let color = |color: &Option<[f32; 3]>| color.map(|c| c.map(|x| in_total_order(f64::from(x))));
+    let by_color = || a.colors.iter().map(color).cmp(b.colors.iter().map(color));
+    let along = |k: usize| a.center[k].total_cmp(&b.center[k]);
+    let by_time = a.time_s.total_cmp(&b.time_s);
+    let by_look = by_time.then_with(by_color);
+    (0..3).fold(by_look, |order, k| order.then_with(|| along(k)))
 }
 
 /// The best of the periods around one over a frequency, to a step between candidates either way.

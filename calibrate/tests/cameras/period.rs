@@ -82,6 +82,25 @@ fn the_order_of_photos_and_the_origin_of_time_do_not_matter() {
     assert!((later.period_s / found.period_s - 1.0).abs() < 1e-3);
 }
 
+/// Three cameras of a rig that stand still take each moment at once, and have far more pairs at no distance than
+/// are compared.
+#[test]
+fn the_order_of_photos_taken_at_once_does_not_matter() {
+    let times: Vec<f64> = (0..72).map(|i| 0.2 * f64::from(i / 3)).collect();
+    let mut shots = photos(&times, running_light(1.37));
+    for (i, shot) in shots.iter_mut().enumerate() {
+        shot.center = DVec3::new((i % 3) as f64, 0.0, 0.0);
+    }
+    let found = find_period(&shots);
+    for turn in 1..6 {
+        shots
+            .chunks_mut(3)
+            .enumerate()
+            .for_each(|(i, moment)| moment.rotate_left((i * turn) % 3));
+        assert_eq!(find_period(&shots), found, "{turn}");
+    }
+}
+
 /// Of photos at even steps lags lie on the borders of bins, where rounding dealt them.
 #[test]
 fn lags_on_borders_are_not_dealt_by_rounding() {
