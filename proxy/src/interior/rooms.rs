@@ -371,7 +371,10 @@ fn outline(model: &Model, triangles: &[u32]) -> Result<Vec<DVec3>, String> {
     // 2. One after the other.
     let next: BTreeMap<_, DVec3> = sides.iter().map(|((a, _), b)| (*a, *b)).collect();
     if next.len() != sides.len() {
-        return Err("its outline is no simple loop".to_owned());
+        return Err(
+            "its outline is no simple loop; give it one flat face, all corners of which are joined"
+                .to_owned(),
+        );
     }
     let Some(first) = next.values().next().copied() else {
         return Err("it has no triangles, or no outline; give it a flat mesh".to_owned());
@@ -380,7 +383,12 @@ fn outline(model: &Model, triangles: &[u32]) -> Result<Vec<DVec3>, String> {
     while corners.len() < next.len() {
         match next.get(&place(corners[corners.len() - 1])) {
             Some(corner) if place(*corner) != place(first) => corners.push(*corner),
-            _ => return Err("its outline is more than one loop".to_owned()),
+            _ => {
+                return Err(
+                    "its outline is more than one loop; give it one flat face without holes"
+                        .to_owned(),
+                );
+            }
         }
     }
     Ok(corners)

@@ -117,6 +117,16 @@ impl Seen {
         Some((hit.along, self.cells_of(hit.triangle_idx)))
     }
 
+    /// Whether a ray's first triangle turns its back: its corners go round clockwise, as seen from there.
+    pub(super) fn is_first_from_behind(&self, from: DVec3, ray: DVec3) -> Option<bool> {
+        if !(from.abs().max_element() < FARTHEST) {
+            return None;
+        }
+        let hit = self.solid.first_hit(from, ray)?;
+        let [a, b, c] = self.solid.mesh().corners(hit.triangle_idx as usize);
+        Some((b - a).cross(c - a).dot(ray) > 0.0)
+    }
+
     /// Whether so it is with the cells of any triangle that a ray meets up to there, in lengths of the ray.
     pub(super) fn any_until(
         &self,

@@ -135,7 +135,8 @@ fn gltf_buffers_may_lie_beside_the_file_but_not_elsewhere() {
         none.display()
     );
     assert!(error.starts_with(&said), "{error}");
-    let remedy = "; put that file there, or export the mesh as .glb";
+    let remedy =
+        "; put that file there, or export the model again as .glb with all that it uses inside";
     assert!(error.ends_with(remedy), "{error}");
 }
 

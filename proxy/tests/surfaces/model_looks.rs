@@ -67,7 +67,7 @@ fn what_is_missing_is_a_plain_colour_and_told() {
     let (plain, warnings) = read(&elsewhere).unwrap();
     let said = "image 0: its bytes cannot be read from gone.png: ";
     assert!(warnings[0].starts_with(said), "{warnings:?}");
-    let remedy = "; put that file there, or export the mesh as .glb: a plain colour instead";
+    let remedy = "; put that file there, or export the model again as .glb with all that it uses inside: a plain colour instead";
     assert!(warnings[0].ends_with(remedy), "{warnings:?}");
     assert_eq!(plain.materials[0].texture_idx, None);
     let (_, warnings) = read(&changed(&bytes, |t| {
@@ -224,6 +224,67 @@ fn what_bones_would_pose_is_told_once() {
     // A skin that no node has poses nothing.
     let (_, warnings) = skinned(&[], "man");
     assert_eq!(warnings, [""; 0]);
+}
+
+#[test]
+fn what_the_file_hides_is_left_out_and_told() {
+    let bytes = mesh::model_to_glb(&small()).unwrap();
+    let (plain, _) = read(&bytes).unwrap();
+    let hiding = |node: usize, visible: Value| {
+        changed(&bytes, |text| {
+            let mut json: Value = serde_json::from_str(&text).unwrap();
+            json["extensionsRequired"] = json!(["KHR_node_visibility"]);
+            json["nodes"][node]["extensions"] = json!({"KHR_node_visibility": visible});
+            json.to_string()
+        })
+    };
+    let (model, warnings) = read(&hiding(1, json!({"visible": false}))).unwrap();
+    assert_eq!(
+        warnings,
+        [
+            "what the file hides (KHR_node_visibility) is left out; unhide it before exporting to have it drawn \
+          (1 node: `chair`)"
+        ]
+    );
+    assert_eq!(model.mesh.triangles, plain.mesh.triangles[..1]);
+    assert_eq!(
+        (&model.nodes, &model.parts[..]),
+        (&plain.nodes, &plain.parts[..1])
+    );
+    // Shown, as it is where nothing is said.
+    for visible in [json!({"visible": true}), json!({})] {
+        let (model, warnings) = read(&hiding(0, visible)).unwrap();
+        assert_eq!((model.parts, warnings), (plain.parts.clone(), vec![]));
+    }
+    // With a node all below it.
+    let all = hiding(0, json!({"visible": false}));
+    let error = read(&all).unwrap_err();
+    assert!(
+        error.starts_with("m.glb: all nodes that have triangles (2) are hidden"),
+        "{error}"
+    );
+    // Openings are not drawn: their outline counts.
+    let opening = changed(&all, |t| t.replace("\"cell:a\"", "\"portal:a|\""));
+    let (model, warnings) = read(&opening).unwrap();
+    assert_eq!((model.parts, warnings), (plain.parts, vec![]));
+}
+
+#[test]
+fn what_is_drawn_smoother_than_the_file_asks_for_is_told() {
+    let bytes = mesh::model_to_glb(&small()).unwrap();
+    let (plain, _) = read(&bytes).unwrap();
+    let hard = changed(&bytes, |t| {
+        t.replace("\"magFilter\":9729", "\"magFilter\":9728")
+    });
+    let (model, warnings) = read(&hard).unwrap();
+    assert_eq!(model, plain);
+    assert_eq!(
+        warnings,
+        [
+            "1 texture: number 0: drawn smoothly, though the file asks for hard texels (NEAREST); enlarge the \
+          picture for sharper ones"
+        ]
+    );
 }
 
 #[test]

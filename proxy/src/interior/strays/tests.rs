@@ -61,6 +61,47 @@ fn around_both() -> Model {
     }
 }
 
+/// A solid, its triangles seen from the front from outside.
+fn solid(min: DVec3, max: DVec3) -> Mesh {
+    let corner = |i: usize| {
+        let at = |k: usize| if i >> k & 1 == 1 { max[k] } else { min[k] };
+        DVec3::new(at(0), at(1), at(2))
+    };
+    let sides = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let triangles = sides.map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    Mesh {
+        positions: (0..8).map(corner).collect(),
+        triangles: triangles.as_flattened().to_vec(),
+    }
+}
+
+#[test]
+fn nobody_stands_in_the_masonry_of_a_thick_wall() {
+    for half in [0.2, 0.35, 0.4, 0.5] {
+        let mut model = around_both();
+        // Beside the doorway, and above it.
+        for [y, z] in [
+            [[0.0, 2.5], [0.0, 1.0]],
+            [[0.0, 2.5], [2.0, 3.0]],
+            [[2.0, 2.5], [1.0, 2.0]],
+        ] {
+            let corner = |x: f64, i: usize| DVec3::new(4.0 + x, y[i], z[i]);
+            let wall = solid(corner(-half, 0), corner(half, 1));
+            model.mesh.append(&wall);
+        }
+        let strays = strays(&rooms(), &model).unwrap();
+        assert!(strays.tried > 1000, "{half}: {}", strays.tried);
+        assert_eq!(strays.found, [], "{half}");
+    }
+}
+
 #[test]
 fn where_too_many_ways_lead_on_fewer_places_are_looked_from() {
     let (interior, model) = (rooms(), around_both());

@@ -13,6 +13,8 @@ const EYES_WITHIN: u32 = 32;
 /// They stand lower than any ceiling, and so far from the cell's sides that they are in no wall; in eyes' heights.
 const HEIGHTS_WITHIN: [f64; 2] = [0.1, 1.2];
 const FROM_SIDES: f64 = 0.2;
+/// Nearer to a side than this one may stand in a wall that two cells share, half of it each; in eyes' heights.
+const HALF_A_WALL: f64 = 0.5;
 /// The floor below them is so near to where it should be; in eyes' heights.
 const UNEVEN: f64 = 0.25;
 /// Who sees more of what is hidden than this share is not in the cell: in a shaft that its outline takes in, say.
@@ -53,7 +55,8 @@ pub(super) fn within(
         });
         let (eye, height) = at_heights(interior, point, height, HEIGHTS_WITHIN);
         if contents.locate(interior, eye) != Some(from)
-            || !is_off_walls(interior, contents, from, eye)
+            || !goes_on_around(interior, contents, from, eye, FROM_SIDES)
+            || is_in_wall(interior, contents, seen, from, eye)
             || !is_over_floor(interior, seen, eye, height)
         {
             continue;
@@ -88,14 +91,42 @@ pub(super) fn within(
     Some(strays)
 }
 
-/// Whether all around a place, at its height, the cell goes on.
-fn is_off_walls(interior: &Interior, contents: &Contents, from: CellId, eye: DVec3) -> bool {
+/// Whether all around a place, at its height, the cell goes on so far, in eyes' heights.
+fn goes_on_around(
+    interior: &Interior,
+    contents: &Contents,
+    from: CellId,
+    eye: DVec3,
+    reach: f64,
+) -> bool {
+    let is_in = |place: DVec3| contents.room_around(interior, from, place).is_some();
+    let mut steps = level_ways(interior).map(|way| reach * interior.eye_height * way);
+    steps.all(|step| is_in(eye + step))
+}
+
+/// Whether a place near the cell's sides is inside of a wall: most of what is next to it at its height is seen from
+/// behind. Farther in, a model whose triangles face the wrong way looks no different.
+fn is_in_wall(
+    interior: &Interior,
+    contents: &Contents,
+    seen: &Seen,
+    from: CellId,
+    eye: DVec3,
+) -> bool {
+    if goes_on_around(interior, contents, from, eye, HALF_A_WALL) {
+        return false;
+    }
+    let met = level_ways(interior).filter_map(|way| seen.is_first_from_behind(eye, way));
+    let (met, behind) = met.fold((0, 0), |(met, n), is| (met + 1, n + usize::from(is)));
+    2 * behind > met
+}
+
+/// Eight ways all around that keep the height.
+fn level_ways(interior: &Interior) -> impl Iterator<Item = DVec3> {
     let (x, y) = interior.up.any_orthonormal_pair();
     let diagonals = [x + y, x - y].map(DVec3::normalize);
     let ways = [x, y, diagonals[0], diagonals[1]];
-    let steps = ways.map(|way| FROM_SIDES * interior.eye_height * way);
-    let is_in = |place: DVec3| contents.room_around(interior, from, place).is_some();
-    steps.into_iter().all(|s| is_in(eye + s) && is_in(eye - s))
+    ways.into_iter().flat_map(|way| [way, -way])
 }
 
 /// Whether what is next below a place is about as far below it as its floor should be.

@@ -115,8 +115,8 @@ pub(super) fn fetch<E>(
     }
     let Some(beside) = path_beside(uri) else {
         return Err(failed(format!(
-            "its bytes are at `{}`; put them into a file beside this one, or export the mesh \
-             as .glb",
+            "its bytes are at `{}`; put them into a file beside this one, or export the model again as \
+             .glb with all that it uses inside",
             shown(uri)
         )));
     };
@@ -130,7 +130,8 @@ pub(super) fn fetch<E>(
     match read {
         Ok(bytes) => Ok((bytes, true)),
         Err(e) => Err(failed(format!(
-            "its bytes cannot be read from {}: {e}; put that file there, or export the mesh as .glb",
+            "its bytes cannot be read from {}: {e}; put that file there, or export the model again as .glb \
+             with all that it uses inside",
             path.display()
         ))),
     }

@@ -72,7 +72,12 @@ struct Sampler {
     wrap_s: u32,
     #[serde(default)]
     wrap_t: u32,
+    #[serde(default)]
+    mag_filter: u32,
 }
+
+/// A sampler's filter that mixes no texels.
+const NEAREST: u32 = 9728;
 
 /// What textures' pictures are by the extensions that name them.
 const KINDS: [(&str, &str); 4] = [
@@ -102,7 +107,15 @@ pub(in crate::mesh) fn parse_model(
     if mesh.triangles.is_empty() {
         let path = path.to_owned();
         return Err(match hidden {
-            0 => MeshFileError::EmptyScene(path),
+            0 if looks.out_of_sight.is_empty() => MeshFileError::EmptyScene(path),
+            0 => MeshFileError::File(
+                path,
+                format!(
+                    "all nodes that have triangles ({}) are hidden ({}); unhide them, and export the model again",
+                    looks.out_of_sight.len(),
+                    super::nodes::VISIBILITY
+                ),
+            ),
             _ => MeshFileError::File(
                 path,
                 format!(
@@ -116,6 +129,8 @@ pub(in crate::mesh) fn parse_model(
     let mut not_shown = looks.not_shown(&decoded);
     not_shown.extend(looks.told_passed_over());
     not_shown.extend(looks.told_unposed());
+    not_shown.extend(looks.told_out_of_sight());
+    not_shown.extend(looks.told_smoothed());
     not_shown.extend(looks.told_unread());
     let Looks {
         mut model,
@@ -151,6 +166,10 @@ struct Looks {
     passed_over: BTreeMap<PassedOver, BTreeSet<(usize, usize)>>,
     /// Nodes whose meshes bones would pose.
     unposed: BTreeSet<usize>,
+    /// Nodes with meshes that the file hides.
+    out_of_sight: BTreeSet<usize>,
+    /// Textures that are drawn smoothly, though the file wants to see their texels.
+    smoothed: BTreeSet<usize>,
     /// Textures that an extension alone has a picture for, by that.
     unread: BTreeMap<String, BTreeSet<usize>>,
     /// How many triangles are left out as nobody could see them, by the file's materials.
@@ -176,6 +195,15 @@ impl Visitor for Looks {
             .push(is_below || name.starts_with(PORTAL_NODE));
         self.node_idxs.insert(number, self.model.nodes.len() as u32);
         self.model.nodes.push(ModelNode { name, parent_idx });
+    }
+
+    fn leaves_out_hidden(&mut self, node: usize) -> bool {
+        // Of an opening only the outline counts, seen or not.
+        let is_left_out = !self.is_opening(node);
+        if is_left_out {
+            self.out_of_sight.insert(node);
+        }
+        is_left_out
     }
 
     fn leaves_out(&self, node: usize, mesh: usize, primitive: usize) -> bool {
@@ -351,6 +379,30 @@ impl Looks {
         })
     }
 
+    /// What the file hides.
+    fn told_out_of_sight(&self) -> Option<String> {
+        let numbers: Vec<usize> = self.out_of_sight.iter().copied().collect();
+        let name = |number| Some(self.node_entry(number)?.name.as_str());
+        let of = super::listed("node", &numbers, name);
+        (!numbers.is_empty()).then(|| {
+            format!(
+                "what the file hides ({}) is left out; unhide it before exporting to have it drawn ({of})",
+                super::nodes::VISIBILITY
+            )
+        })
+    }
+
+    /// What is drawn smoother than the file asks for.
+    fn told_smoothed(&self) -> Option<String> {
+        let numbers: Vec<usize> = self.smoothed.iter().copied().collect();
+        let of = super::listed("texture", &numbers, |_| None);
+        (!numbers.is_empty()).then(|| {
+            format!(
+                "{of}: drawn smoothly, though the file asks for hard texels (NEAREST); enlarge the picture for sharper ones"
+            )
+        })
+    }
+
     /// What textures' pictures are that are not read, once a kind.
     fn told_unread(&self) -> Vec<String> {
         let told = self.unread.iter().map(|(extension, numbers)| {
@@ -460,6 +512,9 @@ impl Looks {
             }
             return Ok((None, wraps));
         };
+        if sampler.is_some_and(|sampler| sampler.mag_filter == NEAREST) {
+            self.smoothed.insert(number);
+        }
         if let Some(idx) = self.picture_idxs.get(&image) {
             return Ok((*idx, wraps));
         }

@@ -20,7 +20,7 @@ use accessor::Accessors;
 use buffers::Buffers;
 use capture::without_byte_order_mark;
 use glam::{DMat4, DVec3};
-use nodes::{Node, Scene, world_from_nodes};
+use nodes::{Node, Placed, Scene, placed_nodes};
 use serde::Deserialize;
 use std::ops::Range;
 use std::path::Path;
@@ -78,14 +78,15 @@ struct Attributes {
 }
 
 /// Required extensions that change how a surface looks, not where it is (what of them is not shown is
-/// told with a model), the one that only allows positions of whole numbers, and the one that is read.
-const HARMLESS: [&str; 6] = [
+/// told with a model), the one that only allows positions of whole numbers, and those that are read.
+const HARMLESS: [&str; 7] = [
     "KHR_materials_",
     "KHR_texture_",
     "EXT_texture_",
     "KHR_lights_",
     "KHR_mesh_quantization",
     nodes::INSTANCING,
+    nodes::VISIBILITY,
 ];
 
 /// Bytes of mesh for each byte of the file, where nodes repeat meshes; and what any file's may take: rows of
@@ -98,6 +99,11 @@ const ANY_COPIES: usize = 64 << 10;
 trait Visitor {
     /// A node of the scene, after its parent.
     fn node(&mut self, _number: usize, _parent: Option<usize>) {}
+
+    /// Whether a node's mesh is to be left out, as the file hides the node.
+    fn leaves_out_hidden(&mut self, _node: usize) -> bool {
+        true
+    }
 
     /// Whether a primitive of a node's mesh is to be left out.
     fn leaves_out(&self, _node: usize, _mesh: usize, _primitive: usize) -> bool {
@@ -205,12 +211,21 @@ fn read(
         copies: 0,
         file_size,
     };
-    for (number, parent, world_from_node) in world_from_nodes(path, root)? {
+    for Placed {
+        number,
+        parent,
+        world_from_node,
+        is_hidden,
+    } in placed_nodes(path, root)?
+    {
         visitor.node(number, parent);
         let node = &root.nodes[number];
         let Some(mesh) = node.mesh.map(|mesh| mesh as usize) else {
             continue;
         };
+        if is_hidden && visitor.leaves_out_hidden(number) {
+            continue;
+        }
         let entry = root.meshes.get(mesh);
         let entry = entry.ok_or_else(|| MeshFileError::Record {
             path: path.to_owned(),

@@ -29,6 +29,9 @@ pub(super) struct Node {
 /// The extension by which a node shows its mesh as often as accessors have transforms.
 pub(super) const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 
+/// The extension by which a node, and all below it, is there but not shown.
+pub(super) const VISIBILITY: &str = "KHR_node_visibility";
+
 /// How far the last row of a node's matrix may be from (0, 0, 0, 1): rounding of what wrote it.
 const AFFINE: f64 = 1e-6;
 
@@ -37,6 +40,13 @@ const AFFINE: f64 = 1e-6;
 struct Extensions {
     #[serde(rename = "EXT_mesh_gpu_instancing")]
     instancing: Option<Instancing>,
+    #[serde(rename = "KHR_node_visibility")]
+    visibility: Option<NodeVisibility>,
+}
+
+#[derive(Deserialize)]
+struct NodeVisibility {
+    visible: Option<bool>,
 }
 
 #[derive(Deserialize)]
@@ -55,12 +65,17 @@ pub(super) struct Copies {
     scale: Option<usize>,
 }
 
-/// The default scene's nodes in the order of the file's trees, each with its parent and its
-/// transform.
-pub(super) fn world_from_nodes(
-    path: &Path,
-    root: &Root,
-) -> Result<Vec<(usize, Option<usize>, DMat4)>, MeshFileError> {
+/// A node of the default scene.
+pub(super) struct Placed {
+    pub(super) number: usize,
+    pub(super) parent: Option<usize>,
+    pub(super) world_from_node: DMat4,
+    /// The file hides it, or one that it is below.
+    pub(super) is_hidden: bool,
+}
+
+/// The default scene's nodes in the order of the file's trees.
+pub(super) fn placed_nodes(path: &Path, root: &Root) -> Result<Vec<Placed>, MeshFileError> {
     // Without scenes every tree is meant.
     let number = root.scene.unwrap_or(0);
     let roots: Vec<usize> = match root.scenes.get(number) {
@@ -83,14 +98,12 @@ pub(super) fn world_from_nodes(
     };
     let mut found = Vec::new();
     let mut is_found = vec![false; root.nodes.len()];
-    let mut open: Vec<(usize, Option<usize>, DMat4)> = Vec::new();
-    open.extend(
-        roots
-            .iter()
-            .rev()
-            .map(|node| (*node, None, DMat4::IDENTITY)),
-    );
-    while let Some((number, parent, world_from_parent)) = open.pop() {
+    // Each with its parent, which is placed already.
+    let mut open: Vec<(usize, Option<usize>)> = Vec::new();
+    open.extend(roots.iter().rev().map(|node| (*node, None)));
+    while let Some((number, parent_place)) = open.pop() {
+        let parent: Option<&Placed> = parent_place.and_then(|place: usize| found.get(place));
+        let world_from_parent = parent.map_or(DMat4::IDENTITY, |parent| parent.world_from_node);
         let here = || format!("node {number}");
         let Some(node) = root.nodes.get(number) else {
             return Err(failed(path, &here(), "there is no such node".to_owned()));
@@ -114,9 +127,14 @@ pub(super) fn world_from_nodes(
             ));
         }
         let children = node.children.as_deref().unwrap_or_default();
-        let below = |child: &usize| (*child, Some(number), world_from_node);
-        open.extend(children.iter().rev().map(below));
-        found.push((number, parent, world_from_node));
+        let place = found.len();
+        open.extend(children.iter().rev().map(|child| (*child, Some(place))));
+        found.push(Placed {
+            number,
+            parent: parent.map(|parent| parent.number),
+            world_from_node,
+            is_hidden: node.is_hidden() || parent.is_some_and(|parent| parent.is_hidden),
+        });
     }
     Ok(found)
 }
@@ -126,6 +144,13 @@ impl Node {
     pub(super) fn copies(&self) -> Option<&Copies> {
         let extensions = self.extensions.as_ref()?;
         Some(&extensions.instancing.as_ref()?.attributes)
+    }
+
+    /// Whether the file hides it, whatever it is below.
+    fn is_hidden(&self) -> bool {
+        let extensions = self.extensions.as_ref();
+        let visibility = extensions.and_then(|extensions| extensions.visibility.as_ref());
+        visibility.is_some_and(|visibility| visibility.visible == Some(false))
     }
 
     /// The last row of its matrix where that is none of a transform that keeps planes parallel, but for rounding.

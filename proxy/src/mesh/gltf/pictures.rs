@@ -90,8 +90,14 @@ fn pixels(bytes: &[u8]) -> Result<RgbaImage, String> {
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     let mut reader = reader.map_err(|error| format!("cannot be read ({error})"))?;
     let is_read = |f| matches!(f, image::ImageFormat::Png | image::ImageFormat::Jpeg);
-    if !reader.format().is_some_and(is_read) {
-        return Err("is neither PNG nor JPEG".to_owned());
+    match reader.format() {
+        Some(format) if is_read(format) => {}
+        Some(format) => {
+            return Err(format!(
+                "is {format:?}, not PNG or JPEG (export the model again with those)"
+            ));
+        }
+        None => return Err("is neither PNG nor JPEG".to_owned()),
     }
     let mut limits = Limits::default();
     limits.max_alloc = Some(MAX_PICTURE);
