@@ -286,7 +286,7 @@ fn largest_rectangle(curve: &[DVec2]) -> Option<(DVec2, DVec2)> {
 ///
 /// Poses and points stay. Keypoints move with what they show; those that no pinhole camera
 /// can see go, also from their points' tracks, and a point goes that loses all but one of its
-/// observations so. The points' errors are computed anew where they were known.
+/// observations so, be they of one image or several. The points' errors are computed anew where they were known.
 ///
 /// # Errors
 /// A camera that has no undistorted picture.

@@ -51,7 +51,8 @@ pub struct Bounded {
 /// Prepares a frame so that its picture is within `max_error` of the exact field's: the root
 /// of the mean squared difference of 8-bit colours, composited on black, over all pixels and
 /// channels. It is the coarsest of [`GRIDS`] whose error, as [`Samples`] measures it, is no
-/// more; the exact field where none is, and where the triangulation refuses the view. No bound
+/// more; the exact field where none is or is likely to be (finer ones are not measured where a coarser one's error is so
+/// large that they would still have too much), and where the triangulation refuses the view. No bound
 /// (infinity) is [`Method::TRIANGULATED`], unmeasured; zero, less or NaN is the exact field.
 ///
 /// # Errors

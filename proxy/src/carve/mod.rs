@@ -6,7 +6,7 @@
 //! Keriven (2007, "Efficient multi-view reconstruction of large-scale scenes using interest
 //! points, Delaunay triangulation and graph cuts"; 2009, "Robust and efficient surface
 //! reconstruction from range data"): a minimum s-t cut, found exactly. The surface is all
-//! facets between free and solid. Cameras are always in free space and everything beyond the
+//! facets between free and solid. Cameras within the shell are always in free space and everything beyond the
 //! shell is solid, so the surface is closed and every ray from a camera meets it.
 //!
 //! Nothing is smoothed: vertices moved a tenth of the way to their neighbours' mean raise the
