@@ -20,6 +20,7 @@ pub mod opencv;
 mod period;
 mod reconstruction;
 mod reprojection;
+mod resized;
 mod rigid;
 mod spread;
 mod ties;

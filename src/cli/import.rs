@@ -112,6 +112,9 @@ pub(super) struct Args {
         conflicts_with_all = ["calibration", "camera_matrix",
         "distortion", "fisheye", "matching", "frames", "fps", "undistort", "depth"])]
     turntable: Option<f64>,
+    /// Photos were reduced or enlarged since they were calibrated, both sides alike: scale their cameras to them
+    #[arg(long, conflicts_with = "turntable")]
+    resized: bool,
     /// Fail on a missing or corrupt photo instead of leaving it out
     #[arg(long)]
     strict: bool,
@@ -183,6 +186,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             (None, Some(per_second)) => TimeSource::FrameRate(per_second),
             (None, None) => TimeSource::Found,
         },
+        resized: args.resized,
         strict: args.strict,
         masks: args.masks.clone(),
         no_masks: args.no_masks,

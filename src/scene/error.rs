@@ -69,6 +69,12 @@ pub enum SceneError {
         /// What is wrong with its camera.
         source: calibrate::CameraError,
     },
+    /// A photo that may be a copy of what was calibrated, of another size.
+    #[error(
+        "{0}; if it was reduced or enlarged since, both sides alike, `lumigraph import --resized` scales its camera to \
+         it"
+    )]
+    Resized(capture::CaptureError),
     /// The photos cannot be undistorted.
     #[error(transparent)]
     Undistort(#[from] calibrate::undistort::UndistortError),

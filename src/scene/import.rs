@@ -7,6 +7,7 @@ use super::home::{error_of_photos, home_of, note_of_home};
 use super::meant::Meant;
 use super::misfit;
 use super::named::Named;
+use super::resized::{self, is_resized};
 use super::times::{Clues, TimeSource, set_times, taken};
 use super::turned::{self, Pixels};
 use super::{Photo, Scene, SceneError, Warning};
@@ -30,6 +31,8 @@ pub struct ImportOptions {
     pub keys: Keys,
     /// Where the photos' times come from.
     pub times: TimeSource,
+    /// Cameras follow photos that were reduced or enlarged since they were calibrated, which are an error else.
+    pub resized: bool,
     /// A missing or corrupt photo is an error rather than left out.
     pub strict: bool,
     /// The folder with ignore masks, `a.jpg.png` or `a.png` for the photo `a.jpg`, as is or
@@ -155,7 +158,10 @@ impl Scene {
             Pixels::Shown { is_sized } => turned::undo(&mut scene, source.path(), is_sized)?,
         });
 
-        // 3. Are they what was calibrated?
+        // 3. Are they what was calibrated, or copies of that?
+        if options.resized {
+            warnings.push(resized::follow(&mut scene)?);
+        }
         warnings.extend(misfit::of(&scene.reconstruction));
         warnings.extend(misfit::of_principal(&scene.reconstruction));
         warnings.extend(misfit::of_extent(&scene.reconstruction));
@@ -256,11 +262,16 @@ impl Scene {
             match photo_size(&photo.path) {
                 Ok(found) if found == expected => {}
                 Ok(found) => {
-                    return Err(SceneError::Capture(CaptureError::Size {
-                        path: photo.path.clone(),
+                    let path = photo.path.clone();
+                    let size = CaptureError::Size {
+                        path,
                         found,
                         expected,
-                    }));
+                    };
+                    return Err(match is_resized(found, expected) {
+                        true => SceneError::Resized(size),
+                        false => SceneError::Capture(size),
+                    });
                 }
                 Err(error) => {
                     let near = near.get(&photo.name);

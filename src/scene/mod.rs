@@ -31,6 +31,7 @@ mod own;
 mod parts;
 mod put_back;
 mod relative;
+mod resized;
 mod rooms;
 mod silhouettes;
 mod source;

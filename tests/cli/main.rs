@@ -39,6 +39,7 @@ mod render_again;
 mod render_film;
 mod repeat;
 mod report;
+mod resized;
 mod run;
 mod scene;
 #[cfg(feature = "window")]

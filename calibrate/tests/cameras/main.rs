@@ -12,4 +12,5 @@ mod opencv_kinds;
 mod opencv_projection;
 mod opencv_storage;
 mod period;
+mod resized;
 mod undistort;
