@@ -19,7 +19,7 @@ pub(super) fn follow(scene: &mut Scene) -> Result<Warning, SceneError> {
     let paths: BTreeMap<&str, _> = photos.map(|p| (p.name.as_str(), &p.path)).collect();
     let whole = &scene.reconstruction;
     let mut sizes: BTreeMap<ImageId, (u32, u32)> = BTreeMap::new();
-    let mut example: Option<(&str, (u32, u32), (u32, u32))> = None;
+    let mut example: Option<(&str, [(u32, u32); 2])> = None;
     for (id, image) in &whole.images {
         let camera = &whole.cameras[&image.camera_id];
         let calibrated = (camera.width, camera.height);
@@ -30,12 +30,12 @@ pub(super) fn follow(scene: &mut Scene) -> Result<Warning, SceneError> {
         };
         if is_resized(found, calibrated) {
             sizes.insert(*id, found);
-            if example.is_none_or(|(name, ..)| image.name.as_str() < name) {
-                example = Some((&image.name, found, calibrated));
+            if example.is_none_or(|(name, _)| image.name.as_str() < name) {
+                example = Some((&image.name, [found, calibrated]));
             }
         }
     }
-    let Some((name, found, calibrated)) = example else {
+    let Some((name, [found, calibrated])) = example else {
         let note =
             "no photo was reduced or enlarged since it was calibrated: --resized changes nothing";
         return Ok(Warning::Note(note.to_owned()));
