@@ -2,7 +2,7 @@
 
 use super::CellId;
 use crate::mesh::{Mesh, Model};
-use crate::{MeshKind, Solid};
+use crate::{Hit, MeshKind, Solid};
 use glam::DVec3;
 use std::collections::HashMap;
 
@@ -110,19 +110,13 @@ impl Seen {
 
     /// How far along a ray its first triangle is, in lengths of the ray, and the cells that have that.
     pub(super) fn first(&self, from: DVec3, ray: DVec3) -> Option<(f64, &[CellId])> {
-        if !(from.abs().max_element() < FARTHEST) {
-            return None;
-        }
-        let hit = self.solid.first_hit(from, ray)?;
+        let hit = self.first_hit(from, ray)?;
         Some((hit.along, self.cells_of(hit.triangle_idx)))
     }
 
     /// Whether a ray's first triangle turns its back: its corners go round clockwise, as seen from there.
     pub(super) fn is_first_from_behind(&self, from: DVec3, ray: DVec3) -> Option<bool> {
-        if !(from.abs().max_element() < FARTHEST) {
-            return None;
-        }
-        let hit = self.solid.first_hit(from, ray)?;
+        let hit = self.first_hit(from, ray)?;
         let [a, b, c] = self.solid.mesh().corners(hit.triangle_idx as usize);
         Some((b - a).cross(c - a).dot(ray) > 0.0)
     }
@@ -137,6 +131,12 @@ impl Seen {
     ) -> bool {
         let met = self.solid.own_hits_until(from, ray, along);
         met.into_iter().any(|i| is(self.cells_of(i)))
+    }
+
+    /// None from where squares do not fit into f32.
+    fn first_hit(&self, from: DVec3, ray: DVec3) -> Option<Hit> {
+        let is_in_reach = from.abs().max_element() < FARTHEST;
+        is_in_reach.then(|| self.solid.first_hit(from, ray))?
     }
 
     /// Of one of `solid`'s triangles.
