@@ -1,5 +1,5 @@
-use crate::{CaptureError, jpeg, reduced_size, resize};
-use image::{DynamicImage, ImageError, ImageFormat, ImageReader, RgbaImage};
+use crate::{CaptureError, jpeg, profile, reduced_size, resize};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits, RgbaImage};
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Cursor, Read, Seek};
 use std::path::Path;
@@ -68,13 +68,14 @@ pub(crate) fn find_in_head<T>(
     }
 }
 
-/// Decodes a photo as 8-bit RGBA, alpha not premultiplied: the stored pixel grid, EXIF
-/// orientation not applied. Grey, palette and 16-bit pictures are converted; a picture
-/// without alpha is opaque.
+/// Decodes a photo as 8-bit sRGB with alpha, not premultiplied: the stored pixel grid, EXIF
+/// orientation not applied. Grey, palette and 16-bit pictures are converted, and so are
+/// colours of another profile (Display P3, Adobe RGB, ...); what sRGB does not reach is cut off.
+/// A picture without alpha is opaque.
 ///
 /// # Errors
-/// A file that cannot be read, is no JPEG or PNG picture, is damaged or cut short, needs
-/// more than 512 MiB, or has another size than `expected_size`.
+/// A file that cannot be read, is no JPEG or PNG picture, or a JPEG of a rare kind, is damaged
+/// or cut short, needs more than 512 MiB, or has another size than `expected_size`.
 pub fn decode(path: &Path, expected_size: Option<(u32, u32)>) -> Result<RgbaImage, CaptureError> {
     let bytes = read(path).map_err(read_failed(path))?;
     decode_content(path, &bytes, expected_size)
@@ -97,17 +98,36 @@ pub fn decode_content(
         }),
         _ => Ok(()),
     };
-    Ok(decode_any(path, bytes, check)?.into_rgba8())
+    let format = format_of(path, bytes)?;
+    let (picture, icc) = decode_with_profile(path, bytes, format, check)?;
+    let transform = match picture.color().has_color() {
+        true => profile::to_srgb(icc.as_deref(), format, bytes),
+        false => None,
+    };
+    let mut picture = picture.into_rgba8();
+    if let Some(transform) = transform {
+        profile::apply(&*transform, &mut picture);
+    }
+    Ok(picture)
 }
 
-/// Decodes a picture's content as stored, once `check` accepts its size. See [`decode`].
+/// Decodes a picture's content, its numbers as stored, once `check` accepts its size. See [`decode`].
 pub(crate) fn decode_any(
     path: &Path,
     bytes: &[u8],
     check: impl Fn((u32, u32)) -> Result<(), CaptureError>,
 ) -> Result<DynamicImage, CaptureError> {
     let format = format_of(path, bytes)?;
+    Ok(decode_with_profile(path, bytes, format, check)?.0)
+}
 
+/// The same, and the ICC profile that it embeds.
+fn decode_with_profile(
+    path: &Path,
+    bytes: &[u8],
+    format: ImageFormat,
+    check: impl Fn((u32, u32)) -> Result<(), CaptureError>,
+) -> Result<(DynamicImage, Option<Vec<u8>>), CaptureError> {
     // 1. The size first: a picture of the wrong one is not worth decoding.
     let size = match format {
         ImageFormat::Jpeg => jpeg::size(bytes),
@@ -121,15 +141,26 @@ pub(crate) fn decode_any(
     };
     check(size)?;
 
-    // 2. The JPEG decoder would paint what is missing grey.
+    // 2. The JPEG decoder would make stripes of some, and paint what is missing grey.
+    if format == ImageFormat::Jpeg
+        && let Some(kind) = jpeg::unread(bytes)
+    {
+        let path = path.to_owned();
+        return Err(CaptureError::Jpeg { path, kind });
+    }
     if format == ImageFormat::Jpeg && !jpeg::is_complete(bytes) {
         return Err(decode_error(path, "the JPEG data have no end"));
     }
 
     // 3. The pixels.
-    let picture = ImageReader::with_format(Cursor::new(bytes), format)
-        .decode()
-        .map_err(|error| decode_failed(path, &error, Some(size)))?;
+    let failed = |error: ImageError| decode_failed(path, &error, Some(size));
+    let reader = ImageReader::with_format(Cursor::new(bytes), format);
+    let mut decoder = reader.into_decoder().map_err(failed)?;
+    let mut limits = Limits::default();
+    limits.reserve(decoder.total_bytes()).map_err(failed)?;
+    decoder.set_limits(limits).map_err(failed)?;
+    let icc = decoder.icc_profile().map_err(failed)?;
+    let picture = DynamicImage::from_decoder(decoder).map_err(failed)?;
 
     // 4. It makes something of damaged data, too.
     if format == ImageFormat::Jpeg
@@ -137,7 +168,7 @@ pub(crate) fn decode_any(
     {
         return Err(decode_error(path, damaged(share)));
     }
-    Ok(picture)
+    Ok((picture, icc))
 }
 
 /// What is wrong with a JPEG that shows damage after a share of the picture.

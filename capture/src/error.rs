@@ -51,6 +51,17 @@ pub enum CaptureError {
         /// What it seems to be.
         found: String,
     },
+    /// A JPEG of a rare kind.
+    #[error(
+        "{}: found a JPEG of {kind}, which is not read; save it as an ordinary JPEG or as a PNG, or leave it out",
+        path.display()
+    )]
+    Jpeg {
+        /// The file.
+        path: PathBuf,
+        /// What it has that others have not.
+        kind: &'static str,
+    },
     /// A picture that is damaged or cut short.
     #[error(
         "cannot decode {}: {problem}; the file may be truncated: copy it again or leave it out",

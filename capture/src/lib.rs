@@ -4,7 +4,8 @@
 //! A photo is its **stored pixel grid**: EXIF orientation is not applied, because
 //! calibrations speak about the pixels as stored. The first pixel's centre is at
 //! (0.5, 0.5), and reducing a photo keeps its corners where they are, so intrinsics
-//! follow by the ratio of the sizes alone.
+//! follow by the ratio of the sizes alone. Its colours are sRGB: those of another profile are
+//! converted.
 
 mod alike;
 mod argument;
@@ -16,6 +17,7 @@ pub mod folder;
 pub mod hold;
 mod jpeg;
 mod photo_set;
+mod profile;
 mod resize;
 mod sequence;
 mod text;

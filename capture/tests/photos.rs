@@ -283,6 +283,52 @@ fn every_truncation_of_a_jpeg_is_an_error() {
     assert_eq!(decode(&path, None).unwrap(), decode(&whole, None).unwrap());
 }
 
+/// They are whole, and the decoder would fail of them or make stripes of them.
+#[test]
+fn a_jpeg_of_a_rare_kind_is_said_to_be_one() {
+    let folder = folder();
+    let bytes = jpeg_bytes(40, 24);
+    let find = |marker: u8| {
+        bytes
+            .windows(2)
+            .position(|it| it == [0xFF, marker])
+            .unwrap()
+    };
+    let (frame, scan) = (find(0xC0), find(0xDA));
+    // Behind the marker: two bytes of length, one of bits, four of size, one of how many components there are, and of
+    // each its number, its sampling and its table.
+    let (bits, sampling) = (frame + 4, frame + 11);
+    assert_eq!(
+        [bytes[bits], bytes[sampling], bytes[scan + 4]],
+        [8, 0x11, 3]
+    );
+    let refused = |name: &str, changes: &[(usize, u8)], kind: &str| {
+        let mut changed = bytes.clone();
+        for &(at, value) in changes {
+            changed[at] = value;
+        }
+        let expected = format!(
+            "{name}: found a JPEG of {kind}, which is not read; save it as an ordinary JPEG or as a \
+             PNG, or leave it out"
+        );
+        assert_eq!(refusal(&put(&folder, name, &changed)), expected);
+    };
+    let kind = frame + 1;
+    refused("a.jpg", &[(kind, 0xC3)], "lossless coding");
+    refused("b.jpg", &[(kind, 0xC5)], "hierarchical coding");
+    refused("c.jpg", &[(kind, 0xC9)], "arithmetic coding");
+    refused("d.jpg", &[(bits, 12)], "more than 8 bits a value");
+    refused("e.jpg", &[(sampling, 0x31)], "samples in threes");
+    for (luma, chroma) in [(0x11, 0x21), (0x12, 0x21), (0x21, 0x12)] {
+        let changes = [(sampling, luma), (sampling + 3, chroma)];
+        refused("f.jpg", &changes, "chroma finer than luma");
+    }
+    for luma in [0x12, 0x22, 0x14] {
+        let changes = [(sampling, luma), (scan + 4, 1)];
+        refused("g.jpg", &changes, "each colour in a scan of its own");
+    }
+}
+
 /// What a card or a disk lost of a photo reads as zeros. The decoder makes something of it.
 #[test]
 fn a_jpeg_that_is_damaged_in_the_middle_is_an_error() {

@@ -11,8 +11,10 @@ mod huffman;
 mod scan;
 #[cfg(test)]
 mod tests;
+mod unread;
 
 pub(crate) use scan::damage;
+pub(crate) use unread::unread;
 
 const FRAMES: std::ops::RangeInclusive<u8> = 0xC0..=0xCF;
 /// Huffman coded frames of one size: baseline, extended and progressive.
