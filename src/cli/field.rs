@@ -8,7 +8,7 @@ use super::frames::{Asked, FRAMES, NamedView};
 use super::inputs::files_behind_scene;
 use super::npz::{Row, Weights, write_npz};
 use super::options::{FieldArgs, HoldOutArgs, SceneArgs, cut, size};
-use super::output::{fill_file, make_parent, print, write_file};
+use super::output::{fill_file, make_parent, print, say, write_file};
 use super::session::{points, spinner};
 use super::surface::ProxyArgs;
 use super::targets::{check_file, check_file_in_no_part, check_inputs};
@@ -126,6 +126,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             let frame = frame_of(views, &args.view)?;
             let named = format!("{}: {}", path.unwrap_or_default(), args.view);
             check_time(named, frame.1, untimed)?;
+            let unused = args.time.note_of_unused(args.at.time, &scene);
+            if let (Some(note), Some(_)) = (unused, frame.1) {
+                say!("note: {}: {note}", path.unwrap_or_default());
+            }
             Ok(frame)
         }
         Some(derived) => {

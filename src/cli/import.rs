@@ -241,6 +241,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             photo.time_s = Some(*time_s);
         }
     }
+    let proxy_before = Scene::proxy_kind(&args.output);
     let exposure = args.exposure.choose_to_write(&mut scene);
     // The scene keeps them: what is made of it may do without, or of their depth maps alone.
     for damaged in &exposure.left_out {
@@ -260,6 +261,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         print_warnings(&warnings?);
     } else {
         scene.save(&args.output, args.force)?;
+    }
+    if let (Some(kind), None) = (proxy_before, &scene.proxy) {
+        say!(
+            "note: {}: its own proxy ({kind}) is gone with the scene that was here; `lumigraph proxy` gives it another",
+            args.output.display()
+        );
     }
     print(&format!(
         "{}: {} photos, {} points{}\n",

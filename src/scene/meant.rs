@@ -2,6 +2,7 @@
 
 use super::home::IMAGES;
 use super::import::ENOUGH;
+use super::resized::is_resized;
 use super::{Photo, Scene, Warning};
 use calibrate::Reconstruction;
 use capture::{
@@ -53,7 +54,7 @@ impl Meant {
         let within = folder_within(&missing, found).filter(|_| missing.len() == sizes.len());
         let elsewhere = within.map_or_else(
             || IN_ANOTHER_FOLDER.to_owned(),
-            |(folder, count)| way_there(folder, count, missing.len(), found, home, calibration),
+            |within| way_there(within, &sizes, found, home, calibration),
         );
         let is_free = |photo: &&PhotoFile| !sizes.contains_key(photo.name.as_str());
         let free: Vec<&PhotoFile> = found.photos.iter().filter(is_free).collect();
@@ -214,26 +215,35 @@ fn folder_within<'f>(names: &[&str], found: &'f PhotoSet) -> Option<(&'f str, us
     (folders.is_empty() && count >= ENOUGH).then_some((folder, count))
 }
 
-/// How to have so many of all photos used that names lead to from a folder within the photos'.
+/// How to have so many of all photos used that names, each with the size that was calibrated, lead to from a folder
+/// within the photos'.
 fn way_there(
-    folder: &str,
-    count: usize,
-    total: usize,
+    (folder, count): (&str, usize),
+    sizes: &BTreeMap<&str, (u32, u32)>,
     found: &PhotoSet,
     home: &Path,
     calibration: &Path,
 ) -> String {
     let folder = found.root.join(folder);
+    let is_reduced = |(name, calibrated): (&&str, &(u32, u32))| {
+        let size = photo_size(&folder.join(name));
+        size.is_ok_and(|size| is_resized(size, *calibrated))
+    };
+    let option = match sizes.iter().any(is_reduced) {
+        true => " --resized",
+        false => "",
+    };
     // What lies beside the photos is found again only where they are called so.
-    let rename = if found.root == home {
+    let rename = if found.root == home && option.is_empty() {
         let images = home.join(IMAGES);
         format!("rename {} to {}, or ", folder.display(), images.display())
     } else {
         String::new()
     };
     format!(
-        "called so in another folder, as {count} of {total} are: {rename}`lumigraph import {} \
-         --calibration {} -o SCENE`",
+        "called so in another folder, as {count} of {} are: {rename}`lumigraph import {} \
+         --calibration {}{option} -o SCENE`",
+        sizes.len(),
         as_argument(&folder),
         as_argument(calibration)
     )

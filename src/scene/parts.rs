@@ -91,6 +91,11 @@ impl Scene {
         Ok(())
     }
 
+    /// What kind of proxy the scene in a folder has as its own; `None` where it has none, or there is no scene.
+    pub fn proxy_kind(folder: &Path) -> Option<String> {
+        Some(scene_file(folder)?.proxy?.kind)
+    }
+
     /// Whether a path, there or not, is that of a part of the scene in the folder around it: one that goes when the
     /// scene is written again, with all that lies in it.
     pub fn is_part(path: &Path) -> bool {

@@ -10,8 +10,12 @@ use calibrate::colmap;
 use capture::folder::exchange;
 use capture::hold::hold;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+
+/// What a photo's brightness may be multiplied by: more is none of a picture's.
+const GAINS: RangeInclusive<f64> = 1e-6..=1e6;
 
 impl Scene {
     /// Opens a scene's folder, or imports a capture's in memory with the defaults.
@@ -56,11 +60,16 @@ impl Scene {
                 let problem = format!("photo {} is not in the model", entry.name);
                 return Err(inconsistent(problem));
             }
-            let is_positive = |g: f64| g > 0.0 && g.is_finite();
-            if !entry.gain.iter().flatten().all(|&g| is_positive(g)) {
-                let problem = format!("photo {}: a gain must be positive", entry.name);
+            if !entry.gain.iter().flatten().all(|g| GAINS.contains(g)) {
+                let problem = format!(
+                    "photo {}: a gain must be positive, and between {} and {}",
+                    entry.name,
+                    GAINS.start(),
+                    GAINS.end()
+                );
                 return Err(inconsistent(problem));
             }
+            let is_positive = |step: f64| step > 0.0 && step.is_finite();
             if !entry.depth_scale.is_none_or(is_positive) {
                 let problem = format!("photo {}: the depth scale must be positive", entry.name);
                 return Err(inconsistent(problem));

@@ -64,3 +64,31 @@ fn reduced_photos_are_used_with_cameras_that_follow_them() {
     let said = "0000.png: the photo has 80 × 72 pixels, expected 48 × 36 as calibrated";
     assert!(error.contains(said), "{error}");
 }
+
+/// Photos that lie in `images_2` alone, as some programs leave them.
+#[test]
+fn what_is_said_of_reduced_photos_in_another_folder_is_right() {
+    let folder = with_wall();
+    let here = folder.path();
+    fs::rename(here.join("wall/images"), here.join("wall/images_2")).unwrap();
+    let photos = fs::read_dir(here.join("wall/images_2")).unwrap();
+    let photos: Vec<_> = photos.map(|entry| entry.unwrap().path()).collect();
+    let said = |rename: &str, option: &str| {
+        let advice = format!(
+            "called so in another folder, as 9 of 9 are: {rename}`lumigraph import wall/images_2 --calibration \
+             wall/sparse/0{option} -o SCENE`"
+        );
+        let error = lumigraph(here, "import wall -o scene").error(1);
+        assert!(error.contains(&advice), "{advice}: {error}");
+    };
+    said("rename wall/images_2 to wall/images, or ", "");
+    for photo in &photos {
+        let picture = image::open(photo).unwrap().into_rgb8();
+        let half = image::imageops::resize(&picture, 48, 36, FilterType::Triangle);
+        half.save(photo).unwrap();
+    }
+    said("", " --resized");
+    let line = "import wall/images_2 --calibration wall/sparse/0 --resized -o scene";
+    let ran = lumigraph(here, line).ok();
+    assert!(ran.stdout.contains("9 photos"), "{}", ran.stdout);
+}

@@ -85,7 +85,14 @@ fn an_earlier_scene_is_replaced_only_by_force_and_other_folders_never() {
     lumigraph(folder.path(), "import wall -o scene").ok();
     let error = lumigraph(folder.path(), "import wall -o scene").error(1);
     assert!(error.contains("--force"), "{error}");
-    lumigraph(folder.path(), "import wall -o scene --force").ok();
+    // What a capture cannot give again is said to be gone.
+    let again = || lumigraph(folder.path(), "import wall -o scene --force").ok();
+    assert!(!again().stderr.contains("proxy"));
+    lumigraph(folder.path(), "proxy scene plane --focus 0004.png:40,30").ok();
+    let said = again().stderr;
+    let note = "note: scene: its own proxy (plane) is gone with the scene that was here; `lumigraph proxy` gives it another\n";
+    assert!(said.ends_with(note), "{said}");
+    assert!(!again().stderr.contains("proxy"));
 
     let before = files(folder.path());
     let error = lumigraph(folder.path(), "import wall -o wall --force").error(1);
@@ -329,6 +336,13 @@ fn a_scene_whose_photos_went_or_that_lies_says_so() {
             "scene/scene.json: photo 0001.png: the depth bounds are {near} and {far}, expected 0 < nearest < farthest; \
              import the photos again"
         );
+        assert_eq!(error(&file), said);
+    }
+    for gain in [0.0, -1.0, 1e300] {
+        let mut file = whole.clone();
+        file["photos"][1]["gain"] = json!([1.0, gain, 1.0]);
+        let said = "scene/scene.json: photo 0001.png: a gain must be positive, and between 0.000001 and 1000000; \
+                    import the photos again";
         assert_eq!(error(&file), said);
     }
     for orientation in [0, 9] {

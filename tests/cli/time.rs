@@ -191,6 +191,19 @@ fn times_of_frames_that_change_nothing_are_told() {
         let note = format!("note: {name}{note}");
         assert_eq!(said.contains(&note), is_told, "{options}: {said}");
     }
+    // So does a path's view in the blending field.
+    for (options, is_told) in [
+        ("timed.json", true),
+        ("timed.json --time-window 0.5", false),
+        ("timed.json --time 0.5", false),
+        ("plain.json", false),
+    ] {
+        let line =
+            format!("field helicopter --proxy plane -o f.png --view frame_0000 --path {options}");
+        let said = lumigraph(here, &line).ok().stderr;
+        let note = format!("note: timed.json{note}");
+        assert_eq!(said.contains(&note), is_told, "{options}: {said}");
+    }
 }
 
 #[test]
