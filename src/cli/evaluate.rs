@@ -13,7 +13,7 @@ use super::targets::{check_folder, check_in_no_part, check_inputs, check_no_phot
 use super::time::TimeArgs;
 use super::took::Start;
 use anyhow::bail;
-use lumigraph::scene::{Scene, TruthScore, picture_files};
+use lumigraph::scene::{Scene, Split, TruthScore, picture_files};
 use render::score::{PSNR_CAP_DB, mean_of};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -139,10 +139,10 @@ fn held_out(args: &Args, scene: &Scene) -> anyhow::Result<BTreeSet<String>> {
         return Ok(scene.every(every));
     }
     let Some(split) = args.hold_out.clone().or_else(|| scene.own_split()) else {
+        say_lost_capture(scene);
         return Ok(scene.held_out_by_default()?);
     };
-    let names = scene.held_out_some(&split)?;
-    let left_out = scene.left_out_of(&split)?;
+    let Split { held_out, left_out } = scene.held_out_some(&split)?;
     if !left_out.is_empty() {
         say!(
             "note: {}: left out of the scene, and not scored: {}",
@@ -150,7 +150,18 @@ fn held_out(args: &Args, scene: &Scene) -> anyhow::Result<BTreeSet<String>> {
             left_out.join(", ")
         );
     }
-    Ok(names)
+    Ok(held_out)
+}
+
+/// Says that photos are held out by their places in the list though the scene's capture may have named some.
+pub(super) fn say_lost_capture(scene: &Scene) {
+    if let Some(capture) = scene.lost_capture() {
+        say!(
+            "note: {}, which the scene was made of, is not there: if it has a split.json, other photos than these were to \
+             be held out; put that into the scene's folder, or import again",
+            capture.display()
+        );
+    }
 }
 
 /// Renders and scores each of the given photos, all of the same others; where one turns out corrupt it is left

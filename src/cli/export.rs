@@ -35,7 +35,7 @@ pub(super) struct Args {
     /// Whose format
     #[arg(long, value_enum)]
     format: Format,
-    /// Replace another COLMAP model that PATH holds
+    /// Replace another model, or whatever else, that PATH holds
     #[arg(long)]
     force: bool,
     /// The model's folder, or the file
@@ -101,12 +101,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         Format::Transforms => {
             let files = files(&scene, output)?;
             let text = transforms_json(whole, &|image| of(&files, image))?;
-            write_file(output, text.as_bytes())?;
+            write_text(&text, args)?;
         }
         Format::OpenCv => {
             let files = files(&scene, output)?;
             let text = opencv_yaml(whole, &|image| of(&files, image).photo)?;
-            write_file(output, text.as_bytes())?;
+            write_text(&text, args)?;
         }
     }
     say_beside(&scene, args.format);
@@ -123,6 +123,21 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             _ => format!("{} points", whole.points.len()),
         }
     ))
+}
+
+/// Writes a calibration, and fails where it would replace anything else, as
+/// [`check_no_other_model`] does.
+fn write_text(text: &str, args: &Args) -> anyhow::Result<()> {
+    let output = &args.output;
+    let is_other =
+        || std::fs::read(output).map_or(output.exists(), |there| there != text.as_bytes());
+    if !args.force && is_other() {
+        bail!(
+            "{}: holds something else; nothing was written: replace it with --force, or choose another -o",
+            output.display()
+        );
+    }
+    write_file(output, text.as_bytes())
 }
 
 /// Whether sparse points are written.

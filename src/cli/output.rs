@@ -65,6 +65,10 @@ pub(super) fn make_parent(path: &Path) -> anyhow::Result<()> {
     let Some(folder) = path.parent() else {
         return Ok(());
     };
-    std::fs::create_dir_all(folder)
-        .with_context(|| format!("{}: cannot make the folder", folder.display()))
+    std::fs::create_dir_all(folder).with_context(|| {
+        format!(
+            "{}: cannot make the folder; check that files may be written there",
+            folder.display()
+        )
+    })
 }

@@ -153,6 +153,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
                 Kind::Fitted(kind) => Some(kind),
                 Kind::Auto | Kind::Mesh => None,
             };
+            if matches!(kind, Some(Fit::Points | Fit::ViewPlane)) && !without.is_empty() {
+                say!(
+                    "note: --hold-out changes nothing: such a surface is made anew for each view, of the photos that it is drawn of"
+                );
+            }
             let mut fewer = without.clone();
             if kind.is_none() {
                 // Kinds are compared by what is drawn, which is exposed alike.

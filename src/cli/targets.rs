@@ -135,10 +135,9 @@ pub(super) fn check_in_no_part(folder: &Path, option: &str) -> anyhow::Result<()
     check_no_part_around(&whole, folder, option)
 }
 
-/// The same of the folder that a file is to lie in.
+/// The same of a file, and of the folder that it is to lie in.
 pub(super) fn check_file_in_no_part(file: &Path, option: &str) -> anyhow::Result<()> {
-    let whole = std::path::absolute(file)?;
-    check_no_part_around(whole.parent().unwrap_or(&whole), file, option)
+    check_no_part_around(&std::path::absolute(file)?, file, option)
 }
 
 /// The same of an absolute path to a folder; `named` is what is to be written, as it was given.

@@ -39,6 +39,9 @@ pub(super) fn say_unused(command: &str, given: &ArgMatches) {
         let why = "a surface that is given by hand rests on no photos";
         say_idle(&["hold_out"], is_given, why);
     }
+    if command == "plan" && matches!(given.try_get_one::<usize>("views"), Ok(Some(1))) {
+        say_idle(&["span"], is_given, "a single camera stands in the middle");
+    }
     let renderer = given.try_get_one::<Renderer>("renderer");
     // A triangulation that is drawn has a grid, whatever renders.
     if matches!(renderer, Ok(Some(Renderer::Exact))) && is_given("grid") && !has("triangulation") {

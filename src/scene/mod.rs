@@ -61,7 +61,7 @@ pub use parts::other_within;
 pub use relative::{relative, relative_lossy};
 pub use rooms::SceneSurface;
 pub use source::{calibration_in, other_models, unused_keys};
-pub use split::SplitFile;
+pub use split::{Split, SplitFile};
 pub use times::TimeSource;
 pub use truth::{Truth, TruthScore};
 

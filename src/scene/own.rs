@@ -80,6 +80,11 @@ pub(super) fn proxy_file(proxy: &Proxy) -> &'static str {
     }
 }
 
+/// Whether a file in a scene's folder is called as those that hold its proxies.
+fn is_proxy_file(name: &str) -> bool {
+    [PROXY_FILE, PROXY_MESH].contains(&name)
+}
+
 impl Scene {
     /// Makes a proxy the scene's own, in its folder, complete or not at all.
     ///
@@ -95,6 +100,15 @@ impl Scene {
             return Err(SceneError::NoFolder(capture.join(SCENE_FILE)));
         };
         let name = proxy_file(&proxy);
+        let path = folder.join(name);
+        let before = self.proxy.as_ref().map(|own| own.file.clone());
+        if before.as_deref() != Some(name) && path.symlink_metadata().is_ok() {
+            return Err(SceneError::Occupied {
+                problem: "the scene does not name it, and it would be replaced; move it away, or give a file with -o"
+                    .to_owned(),
+                path,
+            });
+        }
 
         // 1. Both files, in a folder that goes away on errors.
         let (made, new) = make_within(&folder)?;
@@ -121,9 +135,13 @@ impl Scene {
         write_json(&new.join(SCENE_FILE), &whole)?;
 
         // 2. They take their places.
-        let path = folder.join(name);
         replace(&path, &file, made, &new).map_err(|e| io(&path, "replace the proxy", e))?;
         self.proxy = Some(own);
+        // 3. Under another name the one before is nobody's.
+        let before = before.filter(|before| before != name && is_proxy_file(before));
+        if let Some(before) = before {
+            let _ = std::fs::remove_file(folder.join(before));
+        }
         Ok(path)
     }
 }

@@ -136,11 +136,21 @@ fn is_own_model(folder: &Path) -> bool {
 /// What a link leads to stays where it is.
 fn unnamed_within(folder: &Path, parts: &[&str]) -> Result<Option<PathBuf>, SceneError> {
     let named = named_files(folder);
+    let scene = scene_file(folder);
+    // Without a scene's file nothing tells whose a proxy is that lies beside such a model.
+    let is_own_proxy = |part: &str| match &scene {
+        Some(scene) => scene.proxy.as_ref().is_some_and(|own| own.file == part),
+        None => true,
+    };
     for part in parts {
         let Ok(found) = folder.join(part).symlink_metadata() else {
             continue;
         };
-        let is_file = [PROXY_FILE, PROXY_MESH, SCENE_FILE].contains(part);
+        let is_file = match *part {
+            SCENE_FILE => true,
+            PROXY_FILE | PROXY_MESH => is_own_proxy(part),
+            _ => false,
+        };
         if found.is_file() && !is_file {
             return Ok(Some(PathBuf::from(part)));
         }

@@ -44,6 +44,15 @@ fn read(split: &Path) -> Result<SplitFile, SceneError> {
     SplitFile::parse(split, &bytes)
 }
 
+/// What a split says of a scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Split {
+    /// The photos that it holds out.
+    pub held_out: BTreeSet<String>,
+    /// Those that it names and the scene had to leave out anyway.
+    pub left_out: Vec<String>,
+}
+
 impl Scene {
     /// The photos that a split file holds out. Those that this scene had to leave out
     /// anyway are passed over.
@@ -51,6 +60,11 @@ impl Scene {
     /// # Errors
     /// The file cannot be read, names no photo, or names one the scene does not have.
     pub fn held_out(&self, split: &Path) -> Result<BTreeSet<String>, SceneError> {
+        Ok(self.split(split)?.held_out)
+    }
+
+    /// What a split file says of this scene.
+    fn split(&self, split: &Path) -> Result<Split, SceneError> {
         let read = read(split)?;
         // Splits speak of the photos as the capture calls them.
         let renamed = self.renamed();
@@ -63,10 +77,9 @@ impl Scene {
                 None => name,
             })
             .partition(|name| known.contains(name.as_str()));
-        let unknown: Vec<String> = not_here
+        let (left_out, unknown): (Vec<String>, Vec<String>) = not_here
             .into_iter()
-            .filter(|name| !self.left_out.contains(name))
-            .collect();
+            .partition(|name| self.left_out.contains(name));
         if !unknown.is_empty() {
             return Err(SceneError::UnknownHeldOut {
                 path: split.to_owned(),
@@ -74,17 +87,10 @@ impl Scene {
                 known: self.names(),
             });
         }
-        Ok(here)
-    }
-
-    /// Of the photos that a split file names, those that this scene had to leave out.
-    ///
-    /// # Errors
-    /// The file cannot be read, or names no photo.
-    pub fn left_out_of(&self, split: &Path) -> Result<Vec<String>, SceneError> {
-        let mut names = read(split)?.test;
-        names.retain(|name| self.left_out.contains(name));
-        Ok(names)
+        Ok(Split {
+            held_out: here,
+            left_out,
+        })
     }
 
     /// The split file that came with the photos: in the scene's own folder, else in the
@@ -97,6 +103,13 @@ impl Scene {
             .find(|path| path.is_file())
     }
 
+    /// The capture's folder where it is not there any more, nor a split in the scene's own: that the capture may have had
+    /// one nobody knows.
+    pub fn lost_capture(&self) -> Option<&Path> {
+        let capture = self.capture.as_deref().filter(|capture| !capture.exists());
+        capture.filter(|_| self.own_split().is_none())
+    }
+
     /// The photos to score where nobody says which: those of its own split, else every 8th by
     /// name.
     ///
@@ -104,21 +117,21 @@ impl Scene {
     /// As [`Self::held_out`]; the split's photos are all missing or corrupt.
     pub fn held_out_by_default(&self) -> Result<BTreeSet<String>, SceneError> {
         match self.own_split() {
-            Some(split) => self.held_out_some(&split),
+            Some(split) => Ok(self.held_out_some(&split)?.held_out),
             None => Ok(self.every(EVERY)),
         }
     }
 
-    /// As [`Self::held_out`], but at least one.
+    /// What a split file says that holds out one photo at least.
     ///
     /// # Errors
-    /// As there; they are all missing or corrupt.
-    pub fn held_out_some(&self, split: &Path) -> Result<BTreeSet<String>, SceneError> {
-        let names = self.held_out(split)?;
-        if names.is_empty() {
+    /// As [`Self::held_out`]; its photos are all missing or corrupt.
+    pub fn held_out_some(&self, split: &Path) -> Result<Split, SceneError> {
+        let found = self.split(split)?;
+        if found.held_out.is_empty() {
             return Err(SceneError::UnusableSplit(split.to_owned()));
         }
-        Ok(names)
+        Ok(found)
     }
 
     /// Every `step`-th photo by name, the first included.

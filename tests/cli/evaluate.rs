@@ -144,6 +144,20 @@ fn which_photos_are_held_out() {
     lumigraph(folder.path(), "import wall -o scene").ok();
     assert_eq!(evaluated("wall"), "0005.png");
     assert_eq!(evaluated("scene"), "0005.png");
+    // Of one whose photos lie within, where the capture is not there to be asked, that is said.
+    lumigraph(folder.path(), "import wall --undistort -o flat").ok();
+    let score = "evaluate flat --proxy plane --size 48x36";
+    let has_note = |stderr: &str| stderr.contains(", which the scene was made of, is not there: ");
+    assert!(!has_note(&lumigraph(folder.path(), score).ok().stderr));
+    fs::rename(folder.path().join("wall"), folder.path().join("moved")).unwrap();
+    for (options, is_told) in [("", true), (" --every 3", false)] {
+        let ran = lumigraph(folder.path(), &format!("{score}{options}")).ok();
+        assert_eq!(has_note(&ran.stderr), is_told, "{options}: {}", ran.stderr);
+    }
+    let own = folder.path().join("flat/split.json");
+    fs::copy(folder.path().join("moved/split.json"), &own).unwrap();
+    assert!(!has_note(&lumigraph(folder.path(), score).ok().stderr));
+    fs::rename(folder.path().join("moved"), folder.path().join("wall")).unwrap();
     fs::remove_file(folder.path().join("wall/split.json")).unwrap();
     assert_eq!(evaluated("wall"), "0000.png 0008.png");
 }
@@ -218,6 +232,16 @@ fn a_proxy_that_saw_held_out_photos_is_fitted_again() {
     let ran = lumigraph(folder.path(), "evaluate scene --json").ok();
     assert_eq!(ran.json()["proxy"]["from"], "the scene's own");
     assert_eq!(ran.json()["proxy"]["point"], plane["proxy"]["point"]);
+    // What is made for each view anew is made of those that are there then.
+    for (kind, is_told) in [("points", true), ("view-plane", true), ("plane", false)] {
+        let line = format!("proxy wall {kind} --hold-out wall/split.json -o p.json");
+        let said = lumigraph(folder.path(), &line).ok().stderr;
+        assert_eq!(
+            said.contains("--hold-out changes nothing"),
+            is_told,
+            "{said}"
+        );
+    }
 }
 
 #[test]

@@ -304,6 +304,23 @@ fn another_model_is_replaced_only_by_force() {
         lumigraph(here, &format!("{line} --force")).ok();
         assert_eq!(model(&folder, format), own);
     }
+    // Nor are texts.
+    for (format, file) in [("transforms", "transforms.json"), ("opencv", "camera.yml")] {
+        let line = format!("export wall --format {format} -o {file}");
+        for _ in 0..2 {
+            lumigraph(here, &line).ok();
+        }
+        let own = fs::read(here.join(file)).unwrap();
+        fs::write(here.join(file), "another").unwrap();
+        let error = lumigraph(here, &line).error(1);
+        let said = format!(
+            "{file}: holds something else; nothing was written: replace it with --force, or choose another -o"
+        );
+        assert_eq!(error, said);
+        assert_eq!(fs::read(here.join(file)).unwrap(), b"another");
+        lumigraph(here, &format!("{line} --force")).ok();
+        assert_eq!(fs::read(here.join(file)).unwrap(), own);
+    }
     // Of one in part nobody knows what it says.
     fs::create_dir(here.join("part")).unwrap();
     fs::copy(here.join("colmap/images.bin"), here.join("part/images.bin")).unwrap();

@@ -62,6 +62,9 @@ fn a_house_is_generated_and_planned() {
         }
         assert!((center[1] - 1.6).abs() < 1e-9);
     }
+    let ran = lumigraph(here, "plan house --views 1 --span 90").ok();
+    let note = "note: --span changes nothing: a single camera stands in the middle";
+    assert!(ran.stderr.contains(note), "{}", ran.stderr);
     let ran = lumigraph(here, "plan house/interior.json --views 3 --span 90").ok();
     assert_eq!(ran.stdout.lines().count(), 1 + portals * 2 * 3);
     assert!(ran.stdout.contains("-45.0°"), "{}", ran.stdout);

@@ -171,6 +171,8 @@ fn what_is_somebodys_own_within_a_scenes_parts_stays() {
         "flat/model/mine.txt",
         "thin/model/fr/frame_0000.png",
         "thin/silhouettes/0000.png",
+        "thin/proxy.json",
+        "thin/proxy.ply",
         "thin/proxy.json/mine.txt",
     ] {
         let path = here.join(file);
@@ -204,11 +206,32 @@ fn what_is_somebodys_own_within_a_scenes_parts_stays() {
         format!("field wall --view 0000.png {size} -o thin/model/field.png"),
         format!("field wall --view 0000.png {size} -o f.png --weights flat/depth/f.npz"),
         "proxy wall plane -o thin/model/p.json".to_owned(),
+        "proxy wall plane -o thin/proxy.json".to_owned(),
+        "proxy thin plane -o thin/proxy.json".to_owned(),
     ] {
         let error = lumigraph(here, &line).error(1);
         assert!(error.contains(" is part of a scene, and"), "{error}");
         assert!(files(here) == before, "{line}");
     }
+}
+
+#[test]
+fn a_scene_s_own_proxy_leaves_none_before_it_and_replaces_none_of_somebody_s() {
+    let folder = with_wall();
+    let here = folder.path();
+    lumigraph(here, "import wall -o scene").ok();
+    let [plane, mesh] = ["proxy.json", "proxy.ply"].map(|name| here.join("scene").join(name));
+    for (kind, is_mesh) in [("plane", false), ("carved", true), ("plane", false)] {
+        lumigraph(here, &format!("proxy scene {kind}")).ok();
+        assert_eq!([plane.exists(), mesh.exists()], [!is_mesh, is_mesh]);
+    }
+    fs::write(&mesh, "mine").unwrap();
+    let before = files(here);
+    let error = lumigraph(here, "proxy scene carved").error(1);
+    let said = "scene/proxy.ply: the scene does not name it, and it would be replaced; move it away, or give a file with -o";
+    assert_eq!(error, said);
+    assert!(files(here) == before);
+    lumigraph(here, "proxy scene dominant-plane").ok();
 }
 
 #[test]

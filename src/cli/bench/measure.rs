@@ -5,6 +5,7 @@ use super::settings::{Renderer, Setting, settings};
 use super::skips::{skips, start_up};
 use super::times::{Times, in_turn, timed};
 use super::variants::{HeldOut, Variants, default_proxy, draw, held_out, tried};
+use crate::cli::evaluate::say_lost_capture;
 use crate::cli::exposure::keeps_own;
 use anyhow::Context;
 use calibrate::View;
@@ -23,6 +24,7 @@ pub(super) fn measure(
     device: DeviceChoice,
     bar: &ProgressBar,
 ) -> anyhow::Result<(Subject, Pictures)> {
+    say_lost_capture(&scene);
     let without = scene.held_out_by_default()?;
     let held_out = held_out(&scene, &without, effort)?;
     let first_view = &held_out.first().context("no photo can be held out")?.view;
