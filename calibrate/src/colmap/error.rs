@@ -160,7 +160,7 @@ pub enum ColmapError {
     },
     /// A model was to be written beside the rigs or frames of another one.
     #[error(
-        "{}: the file is of another model, and COLMAP 4 would read it with the one to be written \
+        "{}: the file is of a model that COLMAP 4 wrote, which would read it with the one to be written \
          and fail; choose another folder, or remove rigs and frames there first",
         path.display()
     )]

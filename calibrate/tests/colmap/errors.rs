@@ -465,7 +465,7 @@ fn a_model_is_not_written_beside_the_rigs_of_another() {
             fs::write(&file, "of another model").unwrap();
             let error = write(&small(), folder.path()).unwrap_err().to_string();
             let expected = format!(
-                "{}: the file is of another model, and COLMAP 4 would read it with the one to be \
+                "{}: the file is of a model that COLMAP 4 wrote, which would read it with the one to be \
                  written and fail; choose another folder, or remove rigs and frames there first",
                 file.display()
             );

@@ -261,6 +261,29 @@ fn finished_steps_are_not_repeated() {
 }
 
 #[test]
+fn a_damaged_model_is_made_anew() {
+    let mut bench = Bench::new();
+    bench.write("models/1/images.bin", "");
+    for _ in 0..2 {
+        let error = bench.run().unwrap_err().to_string();
+        assert!(
+            error.ends_with("; started again, it places photos anew"),
+            "{error}"
+        );
+        assert!(bench.commands().contains(&"mapper".to_owned()));
+    }
+    bench.model("1", &[(1, "f3.jpg"), (2, "f1.jpg"), (3, "f2.jpg")]);
+    assert_eq!(bench.run().unwrap().reconstruction.images.len(), 3);
+    assert_eq!(bench.commands(), ["mapper"]);
+    // So is one that was damaged later.
+    bench.write("work/sparse/1/images.bin", "");
+    bench.run().unwrap_err();
+    assert_eq!(bench.commands(), [""; 0]);
+    bench.run().unwrap();
+    assert_eq!(bench.commands(), ["mapper"]);
+}
+
+#[test]
 fn a_locked_database_is_told_from_other_failures() {
     let mut bench = Bench::new();
     // As of an import that was killed, whose COLMAP is still at work; some COLMAPs tell where they were.

@@ -48,7 +48,9 @@ pub enum RunError {
         folder: PathBuf,
     },
     /// A model that COLMAP wrote cannot be read.
-    #[error(transparent)]
+    #[error(
+        "COLMAP wrote what cannot be read, as it does on a full disk: {0}; started again, it places photos anew"
+    )]
     Model(#[from] ColmapError),
     /// A photo cannot be read.
     #[error(transparent)]

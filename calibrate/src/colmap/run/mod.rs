@@ -117,15 +117,28 @@ pub fn run(
     let inputs = record::inputs(photos, options, program.version())?;
     let mut record = Record::open(work, inputs, report)?;
     program.write_list()?;
+    let mut made = None;
     for step in Step::ALL {
         if record.is_finished(step) {
             report(Event::Finished(step));
-        } else {
-            program.run(step, report)?;
-            record.finish(step)?;
+            continue;
         }
+        program.run(step, report)?;
+        if step == Step::Mapping {
+            // Of a full disk COLMAP says nothing. What cannot be read is placed anew the next time.
+            let read = outcome::read(photos, work);
+            if !matches!(read, Ok(_) | Err(RunError::NoModel { .. })) {
+                return read;
+            }
+            made = Some(read);
+        }
+        record.finish(step)?;
     }
-    outcome::read(photos, work)
+    let made = made.unwrap_or_else(|| outcome::read(photos, work));
+    if let Err(RunError::Model(_)) = made {
+        record.forget(Step::Mapping)?;
+    }
+    made
 }
 
 /// Whether a folder is one that [`run`] works in, finished or not.

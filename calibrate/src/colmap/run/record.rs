@@ -123,6 +123,12 @@ impl Record {
         self.write()
     }
 
+    /// A step is to be done again.
+    pub(super) fn forget(&mut self, step: Step) -> Result<(), RunError> {
+        self.file.finished.retain(|finished| *finished != step);
+        self.write()
+    }
+
     fn write(&self) -> Result<(), RunError> {
         let temporary = self.path.with_file_name(TEMPORARY);
         let bytes = serde_json::to_vec_pretty(&self.file).unwrap_or_default();
