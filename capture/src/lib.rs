@@ -38,7 +38,7 @@ pub use decode::{content_size, decode, decode_content, decode_reduced, photo_siz
 pub use error::CaptureError;
 pub use exif::{Exif, quarters_of, read_exif};
 pub use photo_set::{
-    PhotoFile, PhotoSet, find_photos_folder, find_photos_within, has_photo_extension,
+    PhotoFile, PhotoSet, find_photos_folder, find_photos_within, has_photo_extension, unread_photos,
 };
 pub use resize::{reduced_size, resize, resize_mask, resize_used};
 pub use sequence::is_sequence;

@@ -75,6 +75,26 @@ pub(crate) fn other_files(folder: &Path) -> Result<Vec<PhotoFile>, CaptureError>
     Ok(files)
 }
 
+/// What photos' files end in that are of kinds not read here.
+const UNREAD: [&str; 18] = [
+    "heic", "heif", "avif", "webp", "tif", "tiff", "bmp", "jxl", "jp2", "dng", "cr2", "cr3", "nef",
+    "arw", "orf", "raf", "rw2", "jpe",
+];
+
+/// The photos in a folder, and in those within it, that are of kinds which are not read, by their extensions: their names, sorted.
+/// None where it cannot be listed.
+pub fn unread_photos(folder: &Path) -> Vec<String> {
+    let is_unread = |path: &Path| {
+        let end = path.extension().unwrap_or_default();
+        UNREAD.iter().any(|known| end.eq_ignore_ascii_case(known))
+    };
+    let mut files = Vec::new();
+    let listed = collect(folder, "", is_unread, &mut Vec::new(), &mut files);
+    let mut names: Vec<String> = files.into_iter().map(|file| file.name).collect();
+    names.sort();
+    listed.map_or_else(|_| Vec::new(), |()| names)
+}
+
 /// Where a capture's photos are: in its folder `images`, or else in the capture itself if
 /// it directly holds some.
 pub fn find_photos_folder(capture: &Path) -> Option<PathBuf> {

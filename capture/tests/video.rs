@@ -444,6 +444,78 @@ fn damaged_frames_are_no_photos_and_what_is_wrong_is_told() {
     );
 }
 
+/// How much rows differ from those beside them, over how much from those two away: more than one where every other row is of
+/// another moment.
+fn comb(picture: &RgbImage) -> f64 {
+    let apart = |rows: u32| -> f64 {
+        let all = (0..picture.height() - 2).flat_map(|y| (0..picture.width()).map(move |x| (x, y)));
+        let difference = |(x, y)| {
+            let [a, b] = [y, y + rows].map(|y| f64::from(picture.get_pixel(x, y)[0]));
+            (a - b).abs()
+        };
+        all.map(difference).sum()
+    };
+    apart(1) / apart(2)
+}
+
+#[test]
+fn interlaced_frames_become_whole_ones() {
+    let Some(ffmpeg) = ffmpeg() else { return };
+    let here = tempfile::tempdir().unwrap();
+    let at = |name: &str| here.path().join(name).display().to_string();
+    for i in 0..24 {
+        frame(7 * i % 40).save(at(&format!("{i}.png"))).unwrap();
+    }
+    let (pictures, video) = (at("%d.png"), at("torn.mpg"));
+    let words = format!(
+        "-y -v error -framerate 50 -start_number 0 -i {pictures} -vf tinterlace=interleave_top,setfield=tff \
+         -flags +ilme+ildct -c:v mpeg2video -q:v 2 -pix_fmt yuv420p {video}"
+    );
+    let words: Vec<&str> = words.split(' ').collect();
+    let log = here.path().join("log");
+    ffmpeg.run(&words, &log, &mut |_| {}).unwrap();
+    let (photos, video) = (here.path().join("photos"), PathBuf::from(video));
+    let mut said = Vec::new();
+    let (count, shape) = (FrameCount::Frames(4), FrameShape::Square);
+    let mut on_progress = |progress| said.push(progress);
+    let frames = video::extract(&ffmpeg, &video, count, shape, &photos, &mut on_progress).unwrap();
+    assert!(said.contains(&VideoProgress::Deinterlaced));
+    assert_eq!(frames.len(), 4);
+    for taken in frames {
+        let picture = image::open(photos.join(&taken.name)).unwrap().into_rgb8();
+        assert!(comb(&picture) < 1.0, "{}: {}", taken.name, comb(&picture));
+    }
+    // They are torn as they are stored.
+    let whole = at("stored.png");
+    let words = format!("-y -v error -i {} -frames:v 1 {whole}", video.display());
+    let words: Vec<&str> = words.split(' ').collect();
+    ffmpeg.run(&words, &log, &mut |_| {}).unwrap();
+    assert!(comb(&image::open(whole).unwrap().into_rgb8()) > 1.3);
+}
+
+#[test]
+fn what_frames_do_not_show_of_a_high_dynamic_range_is_told() {
+    let Some(ffmpeg) = ffmpeg() else { return };
+    for (curve, said) in [
+        ("arib-std-b67", Some("HLG")),
+        ("smpte2084", Some("PQ")),
+        ("bt709", None),
+    ] {
+        let here = tempfile::tempdir().unwrap();
+        let video = write_video(&ffmpeg, here.path(), &[2], &["-color_trc", curve]);
+        let mut told = None;
+        let mut on_progress = |progress| match progress {
+            VideoProgress::HighDynamicRange(curve) => told = Some(curve),
+            VideoProgress::Deinterlaced => panic!("frames are whole"),
+            _ => {}
+        };
+        let (count, shape) = (FrameCount::Frames(2), FrameShape::Square);
+        let photos = here.path().join("photos");
+        video::extract(&ffmpeg, &video, count, shape, &photos, &mut on_progress).unwrap();
+        assert_eq!(told, said, "{curve}");
+    }
+}
+
 #[test]
 fn what_is_no_video_is_refused() {
     let Some(ffmpeg) = ffmpeg() else { return };

@@ -35,6 +35,7 @@ pub const SAME_RAY: f64 = 1e-12;
 /// [`threshold`]. Paper: wᵢ ∝ aᵢ·max(0, 1 − diffᵢ/t) with t the k-th smallest diff ("k-th
 /// largest" is a misprint). Where that is undefined:
 ///
+/// - fewer than k candidates (paper): t is the largest diff;
 /// - candidates that their masks ignore: as if they were none;
 /// - all others on the very edge of their images (every fovBlend zero): as if each were one;
 /// - candidates with diff ≤ [`SAME_RAY`] (consistent form): they share all weight in

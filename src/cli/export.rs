@@ -212,7 +212,17 @@ fn check_no_other_model(
     format: Format,
     output: &Path,
 ) -> anyhow::Result<()> {
-    // Of one in binary where text is to be written the writer tells.
+    // Of one in binary where text is to be written the writer tells, and of one with rigs.
+    let extension = match format {
+        Format::Colmap => "bin",
+        _ => "txt",
+    };
+    if ["rigs", "frames"]
+        .iter()
+        .any(|stem| output.join(format!("{stem}.{extension}")).exists())
+    {
+        return Ok(());
+    }
     let is_lost = |file: &PathBuf| {
         let is_text = file.extension().is_some_and(|end| end == "txt");
         (is_text || matches!(format, Format::Colmap)) && file.exists()

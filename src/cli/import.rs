@@ -168,6 +168,40 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     }
     // Before another import's frames, or what its COLMAP does, are taken for one's own or replaced.
     let held = is_video.then(|| hold(&args.output)).transpose()?;
+    let proxy_before = Scene::proxy_kind(&args.output);
+    // The scene that is here stays whole until another takes its place.
+    let aside = match is_video {
+        true => {
+            let shape = frame_shape(args);
+            let (video, output) = (&args.photos, &args.output);
+            args.uncalibrated.put_aside(video, shape, output)?
+        }
+        false => None,
+    };
+    let imported = import(args, is_video, held.is_some());
+    match aside {
+        Some(aside) if imported.is_ok() => aside.remove(),
+        Some(aside) => aside.put_back()?,
+        None => {}
+    }
+    let scene = imported?;
+    if let (Some(kind), None) = (proxy_before, &scene.proxy) {
+        say!(
+            "note: {}: its own proxy ({kind}) is gone with the scene that was here; `lumigraph proxy` gives it another",
+            args.output.display()
+        );
+    }
+    print(&format!(
+        "{}: {} photos, {} points{}\n",
+        args.output.display(),
+        scene.photos.len(),
+        scene.reconstruction.points.len(),
+        beside_text(&scene)
+    ))
+}
+
+/// Makes the scene and writes it. `is_held` says whether nobody else works in its folder.
+fn import(args: &Args, is_video: bool, is_held: bool) -> anyhow::Result<Scene> {
     let (capture, frames) = if is_video {
         let folder = Scene::frames_folder(&args.output);
         let shape = frame_shape(args);
@@ -201,9 +235,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     let imported = match first {
         Err(SceneError::Uncalibrated { .. }) => {
-            let _held = match &held {
-                Some(_) => None,
-                None => Some(hold(&args.output)?),
+            let _held = match is_held {
+                true => None,
+                false => Some(hold(&args.output)?),
             };
             let work = Scene::colmap_folder(&args.output);
             let uncalibrated = &args.uncalibrated;
@@ -241,7 +275,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             photo.time_s = Some(*time_s);
         }
     }
-    let proxy_before = Scene::proxy_kind(&args.output);
     let exposure = args.exposure.choose_to_write(&mut scene);
     // The scene keeps them: what is made of it may do without, or of their depth maps alone.
     for damaged in &exposure.left_out {
@@ -262,19 +295,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     } else {
         scene.save(&args.output, args.force)?;
     }
-    if let (Some(kind), None) = (proxy_before, &scene.proxy) {
-        say!(
-            "note: {}: its own proxy ({kind}) is gone with the scene that was here; `lumigraph proxy` gives it another",
-            args.output.display()
-        );
-    }
-    print(&format!(
-        "{}: {} photos, {} points{}\n",
-        args.output.display(),
-        scene.photos.len(),
-        scene.reconstruction.points.len(),
-        beside_text(&scene)
-    ))
+    Ok(scene)
 }
 
 /// The video that a folder's photos were taken out of, where they are those that a scene took out of one and keeps.

@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 ///
 /// Of keyframes the frames between them are written; nerfstudio's file keeps the keyframes beside
 /// them, for its viewer. It knows pinholes alone, with square pixels and their principal point in
-/// the middle: those that `view` and derived paths have. It has no place for times of the scene:
+/// the middle: those that `view` and derived paths have. Times of the scene it tells as shares of
+/// a span that is not known here (`render_time`): they are neither read nor written, and
 /// read again, a frame is of the time at which a film of the file's own frames a second shows it.
 ///
 ///     lumigraph path film/path.json --format nerfstudio -o camera_path.json

@@ -4,10 +4,11 @@ use super::options::WARNINGS_SHOWN;
 use super::output::say;
 use super::session::{progress, spinner};
 use calibrate::colmap::run::{self, Event, Matching, Options, Outcome, Step};
+use capture::unread_photos;
 use capture::video::{self, Damage, FrameCount, FrameShape, VideoFrame, VideoProgress};
 use clap::ValueEnum;
 use indicatif::ProgressBar;
-use lumigraph::scene::Scene;
+use lumigraph::scene::{Aside, Scene};
 use std::path::{Path, PathBuf};
 
 /// How photos without a calibration are had.
@@ -56,6 +57,31 @@ impl UncalibratedArgs {
         self.matching.is_some()
     }
 
+    fn count(&self) -> FrameCount {
+        match (self.frames, self.fps) {
+            (Some(frames), _) => FrameCount::Frames(frames),
+            (None, Some(fps)) => FrameCount::PerSecond(fps),
+            (None, None) => FrameCount::Auto,
+        }
+    }
+
+    /// Puts a scene aside whose frames would be replaced, or takes over one that a killed import has put there.
+    pub(super) fn put_aside(
+        &self,
+        video: &Path,
+        shape: FrameShape,
+        output: &Path,
+    ) -> anyhow::Result<Option<Aside>> {
+        if let Some(left) = Aside::left(output) {
+            return Ok(Some(left));
+        }
+        let frames = Scene::frames_folder(output);
+        match video::would_stay(video, self.count(), shape, &frames)? {
+            true => Ok(None),
+            false => Ok(Aside::put(output)?),
+        }
+    }
+
     /// Writes a video's sharpest frames into a folder.
     pub(super) fn extract(
         &self,
@@ -63,13 +89,10 @@ impl UncalibratedArgs {
         shape: FrameShape,
         folder: &Path,
     ) -> anyhow::Result<Vec<VideoFrame>> {
-        let count = match (self.frames, self.fps) {
-            (Some(frames), _) => FrameCount::Frames(frames),
-            (None, Some(fps)) => FrameCount::PerSecond(fps),
-            (None, None) => FrameCount::Auto,
-        };
+        let count = self.count();
         let bar = spinner("scoring frames");
-        let mut report = |at: VideoProgress| match at {
+        let mut report = |at: VideoProgress| {
+            match at {
             VideoProgress::Scored { frames, time_s } => {
                 bar.set_message(format!("scoring frames: {frames}, up to {time_s:.1} s"));
             }
@@ -79,12 +102,27 @@ impl UncalibratedArgs {
             VideoProgress::Stretched { from, to } => bar.suspend(|| {
                 say!("note: {}: {}", video.display(), stretched(from, to));
             }),
+            VideoProgress::Deinterlaced => bar.suspend(|| {
+                say!(
+                    "note: {}: its frames are interlaced, every other line at another moment, and are deinterlaced",
+                    video.display()
+                );
+            }),
+            VideoProgress::HighDynamicRange(curve) => bar.suspend(|| {
+                say!(
+                    "note: {}: its colours are HDR ({curve}), which frames show pale and flat; convert it before, for one by \
+                     `ffmpeg -i VIDEO -vf zscale=t=linear:npl=203,format=gbrpf32le,zscale=p=bt709,tonemap=mobius,\
+                     zscale=t=bt709:m=bt709:r=tv,format=yuv420p SDR.mp4`",
+                    video.display()
+                );
+            }),
             VideoProgress::Writing { frames } => {
                 bar.set_message(format!("writing {frames} frames"));
             }
             VideoProgress::Done { frames } => bar.suspend(|| {
                 say!("note: the {frames} frames were taken by an earlier run");
             }),
+        }
         };
         let ffmpeg = video::ffmpeg();
         let frames = video::extract(&ffmpeg, video, count, shape, folder, &mut report);
@@ -118,6 +156,14 @@ impl UncalibratedArgs {
             photos.photos.len(),
             work.display()
         );
+        let unread = unread_photos(&photos.root);
+        if let Some(first) = unread.first() {
+            say!(
+                "note: {} photos of other kinds than JPEG and PNG are passed over ({first}, for one): convert them, if they \
+                 are to be used",
+                unread.len()
+            );
+        }
         let mut bars = Bars::default();
         let made = run::run(&run::colmap(), &photos, work, &options, &mut |event| {
             bars.show(event);

@@ -1,5 +1,5 @@
 use super::damaged::damaged_text;
-use capture::as_argument;
+use capture::{as_argument, unread_photos};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -106,7 +106,12 @@ pub enum SceneError {
         expected: (u32, u32),
     },
     /// The photos' silhouettes fit no turntable.
-    #[error("{}: no turntable's cameras: {source}{}", folder.display(), upright(turned.as_deref()))]
+    #[error(
+        "{}: no turntable's cameras: {source}{}{}",
+        folder.display(),
+        upright(turned.as_deref()),
+        gap.as_ref().map_or_else(String::new, |gap| format!("; {gap}"))
+    )]
     Turntable {
         /// The folder of the photos.
         folder: PathBuf,
@@ -114,6 +119,8 @@ pub enum SceneError {
         source: proxy::hull::TurntableError,
         /// Which photos are stored turned, if any are.
         turned: Option<String>,
+        /// Where photos seem to be missing, if they do.
+        gap: Option<String>,
     },
     /// A kind of proxy does not suit the scene.
     #[error("{0}")]
@@ -168,9 +175,11 @@ pub enum SceneError {
     /// The capture holds no photos.
     #[error(
         "{}: no photos here, neither in it nor in `images` or other folders within; give the folder \
-         that holds the photos, and their calibration with `import --calibration`", .0.display()
+         that holds the photos, and their calibration with `import --calibration`{}",
+        .0.display(),
+        unread_text(.1)
     )]
-    NoPhotos(PathBuf),
+    NoPhotos(PathBuf, Vec<String>),
     /// Nor are there photos beside a calibration that names some elsewhere.
     #[error(
         "{}: there are no photos beside it, and those that it names are in {}; give that folder: `lumigraph import {} \
@@ -312,6 +321,11 @@ pub enum SceneError {
 }
 
 impl SceneError {
+    /// Of a capture without photos that are read.
+    pub(super) fn no_photos(capture: &Path) -> Self {
+        Self::NoPhotos(capture.to_owned(), unread_photos(capture))
+    }
+
     /// Of what was to be a folder and is none.
     pub(super) fn no_folder(path: &Path) -> Self {
         let path = path.to_owned();
@@ -331,6 +345,17 @@ pub fn remedy_of_model(path: &Path) -> Option<String> {
 }
 
 /// What to do where photos are stored turned, after all.
+/// What is said of photos of kinds that are not read.
+fn unread_text(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [first, ..] => format!(
+            "; read are JPEG and PNG: convert the {} photos of other kinds ({first}, for one)",
+            names.len()
+        ),
+    }
+}
+
 fn upright(turned: Option<&str>) -> String {
     turned.map_or_else(String::new, |turned| {
         format!("; {turned}: photos must stand upright, as `mogrify -auto-orient` makes them")

@@ -64,7 +64,7 @@ fn own_folder(source: &Source) -> Option<&Path> {
 
 /// The error of a capture without photos; where those that its calibration names are elsewhere, it says so.
 pub(super) fn error_of_photos(source: &Source, error: SceneError) -> SceneError {
-    let (Source::Other(format, file), SceneError::NoPhotos(_)) = (source, &error) else {
+    let (Source::Other(format, file), SceneError::NoPhotos(..)) = (source, &error) else {
         return error;
     };
     let Ok((whole, _)) = read_bare(*format, file) else {

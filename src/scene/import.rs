@@ -191,7 +191,7 @@ impl Scene {
             return Err(SceneError::no_folder(capture));
         }
         let folder = find_photos_within(capture, &beside::FOLDERS)
-            .ok_or_else(|| SceneError::NoPhotos(capture.to_owned()))?;
+            .ok_or_else(|| SceneError::no_photos(capture))?;
         let mut found = PhotoSet::open(&folder)?;
         if folder == capture {
             // Photos that lie in the capture itself have their masks within.

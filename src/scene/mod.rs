@@ -6,6 +6,7 @@
 //! work is in `colmap/`; those taken out of a video are in `photos/`; of a turntable's, the
 //! silhouettes found before a plain background are in `silhouettes/`.
 
+mod aside;
 mod auto;
 mod beside;
 mod calibration;
@@ -47,6 +48,7 @@ mod turned;
 mod turntable;
 mod undistort;
 
+pub use aside::Aside;
 pub use auto::{Trial, trials_text};
 pub use beside::DEPTH_UNITS_PER_STEP;
 pub use calibration::{Sizes, calibrated_size, read_bare};

@@ -40,7 +40,7 @@ pub(super) const FRAMES_FOLDER: &str = "photos";
 /// What [`capture::video::extract`] leaves of the latter if it is killed.
 const PARTIAL_FRAMES: &str = ".photos.partial";
 /// What the name begins with of earlier frames, if it is killed while it replaces them.
-const REPLACED_FRAMES: &str = ".photos.replaced-";
+pub(super) const REPLACED_FRAMES: &str = ".photos.replaced-";
 /// What the name begins with of the folder that a scene is made in, within its own: only that
 /// is surely on the same disk.
 pub(super) const WORK_PREFIX: &str = ".lumigraph-";

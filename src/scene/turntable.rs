@@ -6,7 +6,7 @@ use super::times::{Clues, set_times, taken};
 use super::turned;
 use super::{ImportOptions, Photo, Scene, SceneError, Warning, calibration};
 use calibrate::{Camera, CameraId, Image, ImageId, ModelKind, Reconstruction, Rigid3};
-use capture::{CaptureError, PhotoSet, photo_size};
+use capture::{CaptureError, PhotoSet, number_in_name, photo_size};
 use proxy::hull::{Silhouette, turntable};
 use rayon::prelude::*;
 use std::cmp::Ordering;
@@ -63,6 +63,8 @@ impl Scene {
         turned::set(&mut scene.photos, &taken);
         let turned = turned::text(&scene.photos);
         warnings.extend(turned::note(&scene.photos));
+        let gap = gap(&names);
+        warnings.extend(gap.clone().map(Warning::Note));
         warnings.extend(scene.leave_out_unusable(options.strict, &BTreeMap::new())?);
         scene.find_beside(capture, &meant, options, &mut warnings)?;
         scene.forget_depth(&mut warnings);
@@ -78,6 +80,7 @@ impl Scene {
             folder: found.root.clone(),
             source,
             turned,
+            gap,
         };
         let circle = turntable(&silhouettes, step_degrees).map_err(failed)?;
         warnings.push(Warning::Note(format!(
@@ -170,6 +173,30 @@ pub(super) fn by_numbers(a: &str, b: &str) -> Ordering {
     key(a).cmp(&key(b)).then_with(|| a.cmp(b))
 }
 
+/// What to say where the numbers of photos tell that some are missing: most follow one another, and some do not.
+fn gap(names: &[String]) -> Option<String> {
+    let numbers = names.iter().map(|name| number_in_name(name));
+    let numbers: Vec<(u64, (&str, &str))> = numbers.collect::<Option<_>>()?;
+    let (_, around) = numbers.first()?;
+    if numbers.iter().any(|(_, other)| other != around) {
+        return None;
+    }
+    let step = |pair: &[(u64, (&str, &str))]| pair[1].0.saturating_sub(pair[0].0);
+    let steps: Vec<u64> = numbers.windows(2).map(step).collect();
+    let least = *steps.iter().min()?;
+    let is_gap = |step: &u64| *step > least;
+    let first = steps.iter().position(|step| is_gap(step))?;
+    let is_rare = 2 * steps.iter().filter(|step| is_gap(step)).count() < steps.len();
+    is_rare.then(|| {
+        format!(
+            "{} is followed by {}: each photo counts as one step from the one before; an empty file called as each photo \
+             that is missing keeps its place",
+            names[first],
+            names[first + 1]
+        )
+    })
+}
+
 /// The size that all photos have. Those that cannot be read have no say.
 fn common_size(found: &PhotoSet, names: &[String]) -> Result<(u32, u32), SceneError> {
     let mut first: Option<(&String, (u32, u32))> = None;
@@ -195,7 +222,7 @@ fn common_size(found: &PhotoSet, names: &[String]) -> Result<(u32, u32), SceneEr
     match (first, failed) {
         (Some((_, size)), _) => Ok(size),
         (None, Some(error)) => Err(error.into()),
-        (None, None) => Err(SceneError::NoPhotos(found.root.clone())),
+        (None, None) => Err(SceneError::no_photos(&found.root)),
     }
 }
 

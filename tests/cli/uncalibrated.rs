@@ -250,6 +250,33 @@ fn a_video_becomes_a_scene_with_times() {
     );
     lumigraph(here.path(), &format!("{line} --force")).ok();
     assert!(files(&here.path().join("scene/photos")) == frames);
+
+    // Other frames take their place with the scene that is made of them, and not before.
+    let visible = || {
+        let mut files = files(&here.path().join("scene"));
+        files.retain(|path, _| {
+            !path
+                .to_string_lossy()
+                .starts_with(".photos.replaced-failed")
+        });
+        files
+    };
+    let before = visible();
+    for (options, said) in [
+        ("--frames 5 --calibration nowhere", "nowhere"),
+        // One photo is none that anybody can place.
+        ("--fps 0.01", "photo"),
+    ] {
+        let line = format!("import sweep.mp4 {options} -o scene --force");
+        let error = lumigraph(here.path(), &line).error(1);
+        assert!(error.contains(said), "{error}");
+        assert!(visible() == before, "{options}");
+    }
+    let line = "import sweep.mp4 --frames 5 --calibration model -o scene --force";
+    let ran = lumigraph(here.path(), line).ok();
+    assert!(ran.stdout.contains("5 photos"), "{}", ran.stdout);
+    assert_eq!(files(&here.path().join("scene/photos")).len(), 6);
+    assert!(!here.path().join("scene/.photos.replaced-scene").exists());
 }
 
 /// What other programs calibrate is mostly frames as they are stored, whatever players make of them.

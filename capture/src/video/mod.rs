@@ -58,6 +58,10 @@ pub enum VideoProgress {
         /// As they are written.
         to: (u32, u32),
     },
+    /// Its frames are interlaced, and are made whole ones.
+    Deinterlaced,
+    /// Its colours are of a high dynamic range, which frames do not show as players do; by which curve they are stored.
+    HighDynamicRange(&'static str),
     /// So many of the chosen frames are being written.
     Writing {
         /// How many in all.
@@ -89,7 +93,7 @@ const EXACT: &str = "flags=bicubic+accurate_rnd+full_chroma_int+full_chroma_inp"
 /// they would be others now. An
 /// interrupted run leaves no folder, or the earlier one. Frames that ffmpeg says are corrupt, and
 /// an MJPEG's in which it reports errors, are passed over, with those up to the next key frame, which
-/// are predicted from them. Where that leaves one photo of several, they are taken of the time of the
+/// are predicted from them. Interlaced frames are deinterlaced (but for those of an earlier run, which stay as they are). Where that leaves one photo of several, they are taken of the time of the
 /// whole frames ([`choose()`]). Two extractions at once into one folder take each other's frames away: whoever starts
 /// them keeps them apart ([`hold_now`](crate::hold::hold_now)). Frames whose pixels are not square are drawn out as `shape` says.
 ///
@@ -120,15 +124,15 @@ pub fn extract(
 
     // 1. Which frames.
     let spelling = scan::spelling(ffmpeg)?;
-    let scanned = scan::scan_with(ffmpeg, spelling, video, report)?;
-    let scored = scanned.frames;
+    let mut scanned = scan::scan_with(ffmpeg, spelling, video, report)?;
+    let scored = std::mem::take(&mut scanned.frames);
     if scored.len() < 2 {
         return Err(VideoError::NoVideo {
             path: video.to_owned(),
             frames: scored.len(),
         });
     }
-    if let Some(damage) = scanned.damage {
+    if let Some(damage) = scanned.damage.take() {
         let whole = scored.len() - damage.frames;
         if whole < 2 {
             return Err(VideoError::Damaged {
@@ -145,12 +149,18 @@ pub fn extract(
     if let Some((from, to)) = stretched {
         report(VideoProgress::Stretched { from, to });
     }
+    if scanned.is_interlaced {
+        report(VideoProgress::Deinterlaced);
+    }
+    if let Some(curve) = scanned.curve {
+        report(VideoProgress::HighDynamicRange(curve));
+    }
     let chosen = choose(&scored, count);
     let times_s: Vec<f64> = chosen.iter().map(|&i| scored[i].time_s).collect();
     // The first version took the same ones if nothing of them was to be changed.
     let first = list::read_first_version(folder, &source).filter(|frames| {
         let times = frames.iter().map(|frame| frame.time_s);
-        stretched.is_none() && scanned.is_jpeg_like && times.eq(times_s.iter().copied())
+        stretched.is_none() && scanned.is_as_in_first_version() && times.eq(times_s.iter().copied())
     });
     if let Some(frames) = first {
         list::write(folder, &source, oblong, shape, &frames)?;
@@ -173,7 +183,8 @@ pub fn extract(
     fs::create_dir_all(&partial).map_err(failed(&partial))?;
     let from = scan::input(video, scanned.decoding);
     let size = stretched.map(|(_, to)| to);
-    write_frames(ffmpeg, spelling, from, &chosen, size, &partial)?;
+    let whole = scanned.deinterlaced();
+    write_frames(ffmpeg, spelling, from, &chosen, whole, size, &partial)?;
     let mut frames = Vec::new();
     for (i, (&frame_idx, name)) in chosen.iter().zip(names(&times_s)).enumerate() {
         let time_s = times_s[i];
@@ -194,13 +205,28 @@ pub fn extract(
     Ok(frames)
 }
 
+/// Whether [`extract`] would find that an earlier run took the same frames, or would not replace what the folder holds.
+///
+/// # Errors
+/// The video cannot be read.
+pub fn would_stay(
+    video: &Path,
+    count: FrameCount,
+    shape: FrameShape,
+    folder: &Path,
+) -> Result<bool, VideoError> {
+    let source = list::source(video, count)?;
+    Ok(list::read(folder, &source, shape).is_some() || !list::may_replace(folder))
+}
+
 /// Writes the frames of these indices, which rise, as 1.jpg, 2.jpg, …, drawn out to a size if one is given. `arguments`
-/// say of which video.
+/// say of which video, and `whole` begins the filter.
 fn write_frames(
     ffmpeg: &Tool,
     spelling: scan::Spelling,
     mut arguments: Vec<OsString>,
     chosen: &[usize],
+    whole: &str,
     size: Option<(u32, u32)>,
     folder: &Path,
 ) -> Result<(), VideoError> {
@@ -211,7 +237,10 @@ fn write_frames(
         None => (String::new(), ""),
     };
     let scale = format!("scale={size}out_color_matrix=bt601:out_range=full:{EXACT}{square}");
-    let filter = format!("select='{}',{scale},format=yuvj420p", is_any_of(chosen));
+    let filter = format!(
+        "{whole}select='{}',{scale},format=yuvj420p",
+        is_any_of(chosen)
+    );
     let filter_file = folder.join("filter.txt");
     let failed = VideoError::write_at(&filter_file);
     fs::write(&filter_file, filter).map_err(&failed)?;

@@ -41,9 +41,34 @@ pub(super) struct Scan {
     pub(super) shape: Option<Shape>,
     /// Whether its colours are those of photos, but for their range, as ffmpeg tells.
     pub(super) is_jpeg_like: bool,
+    /// Whether most of its frames are interlaced, and were deinterlaced before they were scored.
+    pub(super) is_interlaced: bool,
+    /// By which curve its colours are stored, if they are of a high dynamic range.
+    pub(super) curve: Option<&'static str>,
     /// How they were decoded: to have the same ones again, as many of a damaged video.
     pub(super) decoding: Decoding,
 }
+
+impl Scan {
+    /// What makes whole frames of interlaced ones, one of each, and leaves others as they are; nothing where most are whole.
+    pub(super) fn deinterlaced(&self) -> &'static str {
+        match self.is_interlaced {
+            true => DEINTERLACED,
+            false => "",
+        }
+    }
+
+    /// Whether frames are as the first version of this program made them.
+    pub(super) fn is_as_in_first_version(&self) -> bool {
+        self.is_jpeg_like && !self.is_interlaced
+    }
+}
+
+/// See [`Scan::deinterlaced`].
+const DEINTERLACED: &str = "bwdif=mode=send_frame:deint=interlaced,";
+
+/// What `showinfo` calls curves of colours of a high dynamic range, and people do.
+const CURVES: [(&str, &str); 2] = [("arib-std-b67", "HLG"), ("smpte2084", "PQ")];
 
 /// How ffmpeg decodes.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -61,10 +86,15 @@ pub(super) fn scan_with(
     video: &Path,
     report: &mut dyn FnMut(VideoProgress),
 ) -> Result<Scan, VideoError> {
-    let scan = scan_once(ffmpeg, spelling, video, Decoding::Fast, report)?;
-    match scan.damage {
-        None => Ok(scan),
-        Some(_) => scan_once(ffmpeg, spelling, video, Decoding::Told, report),
+    let mut once = |decoding, whole| scan_once(ffmpeg, spelling, video, decoding, whole, report);
+    let mut scan = once(Decoding::Fast, "")?;
+    if scan.damage.is_some() {
+        scan = once(Decoding::Told, "")?;
+    }
+    // Torn edges pass for sharp ones.
+    match scan.deinterlaced() {
+        "" => Ok(scan),
+        whole => once(scan.decoding, whole),
     }
 }
 
@@ -73,11 +103,12 @@ fn scan_once(
     spelling: Spelling,
     video: &Path,
     decoding: Decoding,
+    whole: &str,
     report: &mut dyn FnMut(VideoProgress),
 ) -> Result<Scan, VideoError> {
     // Frames come on stdout, each with its size, and what they are on stderr, line by line, as they are stored.
     let filter = format!(
-        "showinfo=checksum=0,scale=w={SCORED_SIDE}:h={SCORED_SIDE}:\
+        "showinfo=checksum=0,{whole}scale=w={SCORED_SIDE}:h={SCORED_SIDE}:\
          force_original_aspect_ratio=decrease:flags=area,format=gray"
     );
     let mut arguments = input(video, decoding);
@@ -89,16 +120,22 @@ fn scan_once(
     let mut shape = None;
     let mut colors = JpegColors::default();
     let mut is_text = false;
+    let (mut interlaced, mut curve) = (0, None);
     let mut on_line = |line: &str| {
         log.read(line);
         colors.read(line);
         is_text |= line.starts_with(OF_TEXT);
+        if let Some(found) = told(line, " color_trc:") {
+            let known = CURVES.into_iter().find(|(name, _)| *name == found);
+            curve = curve.or(known.map(|(_, name)| name));
+        }
         let Some(time_s) = shown_at_s(line) else {
             return;
         };
         if times_s.is_empty() {
             shape = Shape::parse(line);
         }
+        interlaced += usize::from(matches!(told(line, " i:"), Some("T" | "B")));
         times_s.push(time_s);
         report(VideoProgress::Scored {
             frames: times_s.len(),
@@ -132,14 +169,23 @@ fn scan_once(
         is_damaged: is_damaged.next().unwrap_or(false),
     };
     let frames: Vec<ScoredFrame> = times_s.into_iter().zip(scores).map(frame).collect();
+    let count = frames.len();
     let damaged = frames.iter().filter(|frame| frame.is_damaged).count();
     Ok(Scan {
         frames,
         damage: log.damage(damaged),
         shape,
         is_jpeg_like: colors.are_all(),
+        is_interlaced: 2 * interlaced > count,
+        curve,
         decoding,
     })
+}
+
+/// The word behind a key in a line of the filter `showinfo` about a frame.
+fn told<'l>(line: &'l str, key: &str) -> Option<&'l str> {
+    let line = line.strip_prefix(OF_FRAME)?;
+    line.split_once(key)?.1.split_whitespace().next()
 }
 
 /// Whether all that is told of frames' colours is what JPEG's are.
@@ -152,13 +198,13 @@ struct JpegColors {
 
 impl JpegColors {
     fn read(&mut self, line: &str) {
-        if !line.starts_with(OF_FRAME) {
-            return;
-        }
-        let told = |key: &str| line.split_once(key)?.1.split_whitespace().next();
         for (so_far, found, of_jpeg) in [
-            (&mut self.pixels, told(" fmt:"), &JPEG_PIXELS[..]),
-            (&mut self.matrix, told(" color_space:"), &JPEG_MATRICES[..]),
+            (&mut self.pixels, told(line, " fmt:"), &JPEG_PIXELS[..]),
+            (
+                &mut self.matrix,
+                told(line, " color_space:"),
+                &JPEG_MATRICES[..],
+            ),
         ] {
             if let Some(found) = found {
                 *so_far = Some(so_far.unwrap_or(true) && of_jpeg.contains(&found));
