@@ -27,7 +27,7 @@ pub struct PhotoFile {
 
 impl PhotoSet {
     /// Lists the JPEG and PNG files of a folder and the folders within, by their
-    /// extensions in any case. Names that begin with a dot are left out.
+    /// extensions in any case. Names that begin with a dot are left out, and scenes within, whose files an import made.
     ///
     /// # Errors
     /// A folder that cannot be listed or holds no photo; a photo whose name is not UTF-8.
@@ -74,6 +74,9 @@ pub(crate) fn other_files(folder: &Path) -> Result<Vec<PhotoFile>, CaptureError>
     files.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(files)
 }
+
+/// What a folder holds that is a scene.
+const SCENE_FILE: &str = "scene.json";
 
 /// What photos' files end in that are of kinds not read here.
 const UNREAD: [&str; 18] = [
@@ -177,6 +180,10 @@ fn collect(
             continue;
         };
         if is_hidden(&path) || !(is_wanted(&path) || path.is_dir()) {
+            continue;
+        }
+        // What an import put there is none of the photos.
+        if path.join(SCENE_FILE).is_file() {
             continue;
         }
         let Some(file_name) = file_name.to_str() else {

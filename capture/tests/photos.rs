@@ -4,7 +4,7 @@
 use capture::{Beside, check_beside, decode_mask};
 use capture::{
     CaptureError, PhotoSet, decode, decode_reduced, find_photos_folder, find_photos_within,
-    photo_size, read_exif, resize, write_png,
+    photo_size, read_exif, resize, unread_photos, write_png,
 };
 use image::codecs::jpeg::JpegEncoder;
 use image::{DynamicImage, GrayImage, ImageBuffer, ImageFormat, Luma, Rgba, RgbaImage};
@@ -68,6 +68,11 @@ fn photos_are_listed_by_name_through_all_folders() {
         "._a.jpg",
         ".hidden/d.jpg",
         "jpg",
+        // A scene of these photos.
+        "scene/scene.json",
+        "scene/images/e.png",
+        "e.HEIC",
+        "deep/f.tiff",
     ] {
         put(&folder, name, b"anything");
     }
@@ -78,6 +83,7 @@ fn photos_are_listed_by_name_through_all_folders() {
     assert_eq!(found.path, folder.path().join("deep/er/c.Png"));
     assert!(set.find("c.Png").is_none());
     assert_eq!(set.root, folder.path());
+    assert_eq!(unread_photos(folder.path()), ["deep/f.tiff", "e.HEIC"]);
 }
 
 #[cfg(unix)]

@@ -494,6 +494,47 @@ fn interlaced_frames_become_whole_ones() {
 }
 
 #[test]
+fn what_would_make_wrong_photos_is_refused_and_leaves_nothing() {
+    let Some(ffmpeg) = ffmpeg() else { return };
+    let here = tempfile::tempdir().unwrap();
+    let whole = write_video(&ffmpeg, here.path(), &[2], &[]);
+    let photos = here.path().join("photos");
+    let refused = |video: &Path, count| {
+        let shape = FrameShape::Square;
+        let error = video::extract(&ffmpeg, video, count, shape, &photos, &mut |_| {}).unwrap_err();
+        assert!(!photos.exists());
+        error
+            .to_string()
+            .replace(&video.display().to_string(), "VIDEO")
+    };
+    assert_eq!(
+        refused(&whole, FrameCount::PerSecond(0.01)),
+        "VIDEO: one frame would be taken of 2.9 s, and photos are two or more; ask for more, by --fps or --frames"
+    );
+    // Two recordings, one after the other.
+    let log = here.path().join("log");
+    let part = |name: &str, size: &str| {
+        let file = here.path().join(name);
+        let words = format!(
+            "-y -v error -i {} -vf scale={size} {}",
+            whole.display(),
+            file.display()
+        );
+        let words: Vec<&str> = words.split(' ').collect();
+        ffmpeg.run(&words, &log, &mut |_| {}).unwrap();
+        fs::read(file).unwrap()
+    };
+    let joined = here.path().join("joined.ts");
+    let both = [part("a.ts", "320:240"), part("b.ts", "160:120")].concat();
+    fs::write(&joined, both).unwrap();
+    let said = refused(&joined, FrameCount::Frames(7));
+    assert!(
+        said.starts_with("VIDEO: its pictures change in size or kind at "),
+        "{said}"
+    );
+}
+
+#[test]
 fn what_frames_do_not_show_of_a_high_dynamic_range_is_told() {
     let Some(ffmpeg) = ffmpeg() else { return };
     for (curve, said) in [

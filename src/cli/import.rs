@@ -162,6 +162,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let message = "--frames and --fps are for a video's file, and PHOTOS is none";
         return Err(Usage(message.to_owned()).into());
     }
+    if is_video && args.frame_rate.is_some() {
+        let message = "--frame-rate is for frames that are counted in their names, and a video tells its times itself; \
+                       --times FILE.csv gives others";
+        return Err(Usage(message.to_owned()).into());
+    }
     if is_video && args.turntable.is_some() {
         let message = "--turntable takes a folder of photos in even steps, and PHOTOS is a file";
         return Err(Usage(message.to_owned()).into());
@@ -268,8 +273,10 @@ fn import(args: &Args, is_video: bool, is_held: bool) -> anyhow::Result<Scene> {
     if args.strict {
         check_photos(&scene)?;
     }
-    let times = frames.iter().map(|f| (f.name.as_str(), f.time_s));
-    let time_of: BTreeMap<&str, f64> = times.collect();
+    // A list that is given says what the film does not, as of slow motion.
+    let is_listed = args.times.is_some();
+    let own = frames.iter().filter(|_| !is_listed);
+    let time_of: BTreeMap<&str, f64> = own.map(|f| (f.name.as_str(), f.time_s)).collect();
     for photo in &mut scene.photos {
         if let Some(time_s) = time_of.get(photo.name.as_str()) {
             photo.time_s = Some(*time_s);

@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 /// How photos without a calibration are had.
 #[derive(clap::Args)]
 pub(super) struct UncalibratedArgs {
-    /// Without a calibration: which pairs of photos COLMAP matches [default: neighbours for
-    /// videos and long numbered sequences, else all]
+    /// Without a calibration: which pairs of photos COLMAP matches [default: neighbours of 30
+    /// and more frames of a video or numbered photos, else all]
     #[arg(long, value_enum)]
     matching: Option<MatchingName>,
     /// Of a video: take the sharpest frames of so many equal stretches [default: 3 a second,

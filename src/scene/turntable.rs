@@ -185,8 +185,9 @@ fn gap(names: &[String]) -> Option<String> {
     let steps: Vec<u64> = numbers.windows(2).map(step).collect();
     let least = *steps.iter().min()?;
     let is_gap = |step: &u64| *step > least;
-    let first = steps.iter().position(|step| is_gap(step))?;
-    let is_rare = 2 * steps.iter().filter(|step| is_gap(step)).count() < steps.len();
+    let first = steps.iter().position(is_gap)?;
+    let gaps = steps.iter().filter(|step| is_gap(step)).count();
+    let is_rare = 2 * gaps < steps.len();
     is_rare.then(|| {
         format!(
             "{} is followed by {}: each photo counts as one step from the one before; an empty file called as each photo \

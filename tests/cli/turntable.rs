@@ -194,6 +194,34 @@ fn what_is_no_turntable_is_told() {
         assert_eq!(ran.code, 2, "{line}: {}", ran.stderr);
         assert!(ran.stderr.contains(said), "{line}: {}", ran.stderr);
     }
+    // A photo that is missing moves all after it.
+    let has_gap = |said: &str| {
+        said.contains("0003.png is followed by 0005.png: each photo counts as one step")
+    };
+    fs::rename(
+        folder.path().join("wall/images/0004.png"),
+        folder.path().join("0004.png"),
+    )
+    .unwrap();
+    let mattes = folder.path().join("mattes");
+    fs::create_dir(&mattes).unwrap();
+    let matte = |i: usize| mattes.join(format!("{i:04}.png"));
+    let object = image::GrayImage::from_fn(96, 72, |x, y| {
+        let is_in = (30..60).contains(&x) && (20..50).contains(&y);
+        image::Luma([if is_in { 255 } else { 0 }])
+    });
+    (0..9).for_each(|i| object.save(matte(i)).unwrap());
+    let line = "import wall --turntable 10 --mattes mattes -o t --force";
+    let said = lumigraph(folder.path(), line).stderr;
+    assert!(has_gap(&said), "{said}");
+    fs::write(folder.path().join("wall/images/0004.png"), "").unwrap();
+    let said = lumigraph(folder.path(), line).stderr;
+    assert!(!has_gap(&said), "{said}");
+    fs::rename(
+        folder.path().join("0004.png"),
+        folder.path().join("wall/images/0004.png"),
+    )
+    .unwrap();
     // Bricks are no background.
     let error = lumigraph(folder.path(), "import wall --turntable 10 -o s").error(1);
     assert!(

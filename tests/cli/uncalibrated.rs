@@ -277,6 +277,22 @@ fn a_video_becomes_a_scene_with_times() {
     assert!(ran.stdout.contains("5 photos"), "{}", ran.stdout);
     assert_eq!(files(&here.path().join("scene/photos")).len(), 6);
     assert!(!here.path().join("scene/.photos.replaced-scene").exists());
+
+    // As of slow motion.
+    let list: String = model
+        .images
+        .values()
+        .map(|i| format!("{},{}\n", i.name, 100 + i.name.len()))
+        .collect();
+    fs::write(here.path().join("times.csv"), list).unwrap();
+    let line = "import sweep.mp4 --frames 9 --calibration model --times times.csv -o slow";
+    lumigraph(here.path(), line).ok();
+    let scene = fs::read(here.path().join("slow/scene.json")).unwrap();
+    let scene: serde_json::Value = serde_json::from_slice(&scene).unwrap();
+    assert_eq!(scene["photos"][3]["time_s"].as_f64(), Some(115.0));
+    let line = "import sweep.mp4 --frame-rate 4 -o rate";
+    let error = lumigraph(here.path(), line).error(2);
+    assert!(error.contains("a video tells its times itself"), "{error}");
 }
 
 /// What other programs calibrate is mostly frames as they are stored, whatever players make of them.

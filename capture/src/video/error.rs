@@ -48,6 +48,29 @@ pub enum VideoError {
         /// How many it has.
         frames: usize,
     },
+    /// So few are asked for that one is taken.
+    #[error(
+        "{}: one frame would be taken of {seconds:.1} s, and photos are two or more; ask for more, by --fps or --frames",
+        path.display()
+    )]
+    OneFrame {
+        /// The file.
+        path: PathBuf,
+        /// How long it is.
+        seconds: f64,
+    },
+    /// A video that goes on as another one.
+    #[error(
+        "{}: its pictures change in size or kind at {at_s:.2} s, as where recordings are joined; make them alike first, for one \
+         by `ffmpeg -i VIDEO -vf scale=1280:720,setsar=1,format=yuv420p ALIKE.mp4`",
+        path.display()
+    )]
+    Changes {
+        /// The file.
+        path: PathBuf,
+        /// When, in seconds.
+        at_s: f64,
+    },
     /// A video with too few frames that are whole.
     #[error(
         "{}: {whole} of its {frames} frames can be decoded undamaged, expected two or more: {damage}; \

@@ -156,6 +156,12 @@ pub fn extract(
         report(VideoProgress::HighDynamicRange(curve));
     }
     let chosen = choose(&scored, count);
+    if chosen.len() < 2 {
+        return Err(VideoError::OneFrame {
+            path: video.to_owned(),
+            seconds: scored.last().map_or(0.0, |frame| frame.time_s),
+        });
+    }
     let times_s: Vec<f64> = chosen.iter().map(|&i| scored[i].time_s).collect();
     // The first version took the same ones if nothing of them was to be changed.
     let first = list::read_first_version(folder, &source).filter(|frames| {
@@ -184,7 +190,12 @@ pub fn extract(
     let from = scan::input(video, scanned.decoding);
     let size = stretched.map(|(_, to)| to);
     let whole = scanned.deinterlaced();
-    write_frames(ffmpeg, spelling, from, &chosen, whole, size, &partial)?;
+    let written = write_frames(ffmpeg, spelling, from, &chosen, whole, size, &partial);
+    if written.is_err() {
+        // It would keep a full disk full.
+        let _ = fs::remove_dir_all(&partial);
+    }
+    written?;
     let mut frames = Vec::new();
     for (i, (&frame_idx, name)) in chosen.iter().zip(names(&times_s)).enumerate() {
         let time_s = times_s[i];

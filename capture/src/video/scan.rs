@@ -121,6 +121,8 @@ fn scan_once(
     let mut colors = JpegColors::default();
     let mut is_text = false;
     let (mut interlaced, mut curve) = (0, None);
+    // Where the filters were made anew, and count from zero again.
+    let mut changed_s = None;
     let mut on_line = |line: &str| {
         log.read(line);
         colors.read(line);
@@ -134,6 +136,9 @@ fn scan_once(
         };
         if times_s.is_empty() {
             shape = Shape::parse(line);
+        }
+        if told(line, " n:") == Some("0") && !times_s.is_empty() {
+            changed_s = changed_s.or(Some(time_s));
         }
         interlaced += usize::from(matches!(told(line, " i:"), Some("T" | "B")));
         times_s.push(time_s);
@@ -153,6 +158,12 @@ fn scan_once(
     if is_text {
         return Err(VideoError::Text {
             path: video.to_owned(),
+        });
+    }
+    if let Some(at_s) = changed_s {
+        return Err(VideoError::Changes {
+            path: video.to_owned(),
+            at_s,
         });
     }
     let scores = scores.map_err(|source| match source {
