@@ -14,9 +14,9 @@ const SAME_STEPS: u8 = 3;
 /// Values of each channel that a profile is tried on.
 const TRIED_VALUES: usize = 18;
 
-/// Which colours a photo's numbers mean, where they are not sRGB's: the ICC profile that its file embeds; of a JPEG
-/// without one, Adobe RGB if its EXIF data say so as cameras do (DCF 2.0, the optional colour space). `None` for what
-/// is no profile of RGB that can be read: such numbers are taken as they are stored.
+/// What makes sRGB's numbers of a photo's, where these mean other colours: by the ICC profile that its file embeds; of a
+/// JPEG without one, by Adobe RGB if its EXIF data say so as cameras do (DCF 2.0, the optional colour space). `None` for
+/// sRGB itself and for what is no profile of RGB that can be read: such numbers are taken as they are stored.
 pub(crate) fn to_srgb(
     embedded: Option<&[u8]>,
     format: ImageFormat,

@@ -209,7 +209,7 @@ fn exports_say_what_they_leave_out() {
     let export = |options: &str, format: &str| {
         let line = format!("import wall {options}-o scene --force");
         lumigraph(here, &line).ok();
-        let line = format!("export scene --format {format} -o out/t");
+        let line = format!("export scene --format {format} --force -o out/t");
         let ran = lumigraph(here, &line).ok();
         let text = fs::read_to_string(here.join("out/t")).unwrap_or_default();
         let notes = ran.stderr.lines().filter(|line| line.starts_with("note: "));

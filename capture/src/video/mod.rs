@@ -93,12 +93,14 @@ const EXACT: &str = "flags=bicubic+accurate_rnd+full_chroma_int+full_chroma_inp"
 /// they would be others now. An
 /// interrupted run leaves no folder, or the earlier one. Frames that ffmpeg says are corrupt, and
 /// an MJPEG's in which it reports errors, are passed over, with those up to the next key frame, which
-/// are predicted from them. Interlaced frames are deinterlaced (but for those of an earlier run, which stay as they are). Where that leaves one photo of several, they are taken of the time of the
+/// are predicted from them. Where that leaves one photo of several, they are taken of the time of the
 /// whole frames ([`choose()`]). Two extractions at once into one folder take each other's frames away: whoever starts
 /// them keeps them apart ([`hold_now`](crate::hold::hold_now)). Frames whose pixels are not square are drawn out as `shape` says.
+/// Interlaced ones are deinterlaced before they are scored, but for those of an earlier run, which stay as they are.
 ///
 /// # Errors
-/// `ffmpeg` is missing or fails; a file that is no video or has but one whole frame; a folder that
+/// `ffmpeg` is missing or fails; a file that is no video or has but one whole frame, or whose pictures change in size on
+/// the way; a count of frames that takes one; a folder that
 /// holds anything but an earlier run's frames; files that cannot be read or written.
 pub fn extract(
     ffmpeg: &Tool,
