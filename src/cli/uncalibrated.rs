@@ -91,8 +91,7 @@ impl UncalibratedArgs {
     ) -> anyhow::Result<Vec<VideoFrame>> {
         let count = self.count();
         let bar = spinner("scoring frames");
-        let mut report = |at: VideoProgress| {
-            match at {
+        let mut report = |at: VideoProgress| match at {
             VideoProgress::Scored { frames, time_s } => {
                 bar.set_message(format!("scoring frames: {frames}, up to {time_s:.1} s"));
             }
@@ -103,18 +102,10 @@ impl UncalibratedArgs {
                 say!("note: {}: {}", video.display(), stretched(from, to));
             }),
             VideoProgress::Deinterlaced => bar.suspend(|| {
-                say!(
-                    "note: {}: its frames are interlaced, every other line at another moment, and are deinterlaced",
-                    video.display()
-                );
+                say!("note: {}: {DEINTERLACED}", video.display());
             }),
             VideoProgress::HighDynamicRange(curve) => bar.suspend(|| {
-                say!(
-                    "note: {}: its colours are HDR ({curve}), which frames show pale and flat; convert it before, for one by \
-                     `ffmpeg -i VIDEO -vf zscale=t=linear:npl=203,format=gbrpf32le,zscale=p=bt709,tonemap=mobius,\
-                     zscale=t=bt709:m=bt709:r=tv,format=yuv420p SDR.mp4`",
-                    video.display()
-                );
+                say!("note: {}: {}", video.display(), high_dynamic_range(curve));
             }),
             VideoProgress::Writing { frames } => {
                 bar.set_message(format!("writing {frames} frames"));
@@ -122,7 +113,6 @@ impl UncalibratedArgs {
             VideoProgress::Done { frames } => bar.suspend(|| {
                 say!("note: the {frames} frames were taken by an earlier run");
             }),
-        }
         };
         let ffmpeg = video::ffmpeg();
         let frames = video::extract(&ffmpeg, video, count, shape, folder, &mut report);
@@ -180,6 +170,19 @@ fn stretched(from: (u32, u32), to: (u32, u32)) -> String {
     let [from, to] = [from, to].map(|(width, height)| format!("{width} × {height}"));
     format!(
         "its pixels are not square, so its frames of {from} are drawn out to {to}, as players show them"
+    )
+}
+
+/// What is said of an interlaced video.
+const DEINTERLACED: &str =
+    "its frames are interlaced, every other line at another moment, and are deinterlaced";
+
+/// What is said of a video of a high dynamic range.
+fn high_dynamic_range(curve: &str) -> String {
+    format!(
+        "its colours are HDR ({curve}), which frames show pale and flat; convert it before, for one by `ffmpeg -i VIDEO -vf \
+         zscale=t=linear:npl=203,format=gbrpf32le,zscale=p=bt709,tonemap=mobius,zscale=t=bt709:m=bt709:r=tv,\
+         format=yuv420p SDR.mp4`"
     )
 }
 
