@@ -1,9 +1,9 @@
 //! Taking photos out of videos: with ffmpeg itself where it is installed, and with
 //! scripts in its place.
 
-use capture::video::{self, FrameCount, FrameShape, VideoError, VideoProgress};
+use capture::video::{self, Curve, FrameCount, FrameShape, VideoError, VideoProgress};
 use capture::{Tool, ToolError};
-use image::{Rgb, RgbImage, imageops};
+use image::{ImageBuffer, Rgb, RgbImage, imageops};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -534,16 +534,81 @@ fn what_would_make_wrong_photos_is_refused_and_leaves_nothing() {
     );
 }
 
+/// Colours of which each is a square of the pictures.
+const COLORS: [[u8; 3]; 6] = [
+    [30, 30, 30],
+    [118, 118, 118],
+    [200, 200, 200],
+    [200, 60, 50],
+    [60, 170, 80],
+    [70, 90, 210],
+];
+
+/// What 16 bits of HLG or PQ store of an sRGB colour whose white is at 203 cd/m², in BT.2020's primaries: by ITU-R
+/// BT.2087, BT.2100 and BT.2408.
+fn stored(color: [u8; 3], curve: &str) -> [u16; 3] {
+    let light = color.map(|code| match f64::from(code) / 255.0 {
+        c if c <= 0.04045 => c / 12.92,
+        c => ((c + 0.055) / 1.055).powf(2.4),
+    });
+    let rows = [
+        [0.6274, 0.3293, 0.0433],
+        [0.0691, 0.9195, 0.0114],
+        [0.0164, 0.0880, 0.8956],
+    ];
+    let dot = |row: [f64; 3]| (0..3).map(|k| row[k] * light[k]).sum::<f64>() * 203.0;
+    let shown = rows.map(dot);
+    let luminance = 0.2627 * shown[0] + 0.6780 * shown[1] + 0.0593 * shown[2];
+    let code = |shown: f64| match curve {
+        "smpte2084" => {
+            let power = (shown / 10_000.0).powf(2610.0 / 16384.0);
+            ((0.8359375 + 18.8515625 * power) / (1.0 + 18.6875 * power)).powf(78.84375)
+        }
+        _ => {
+            let scene = shown / 1000.0 * (luminance / 1000.0).powf(1.0 / 1.2 - 1.0);
+            match scene <= 1.0 / 12.0 {
+                true => (3.0 * scene).sqrt(),
+                false => 0.17883277 * (12.0 * scene - 0.28466892).ln() + 0.55991073,
+            }
+        }
+    };
+    shown.map(|shown| (code(shown) * 65535.0).round() as u16)
+}
+
 #[test]
-fn what_frames_do_not_show_of_a_high_dynamic_range_is_told() {
+fn a_high_dynamic_range_is_brought_to_that_of_photos() {
     let Some(ffmpeg) = ffmpeg() else { return };
     for (curve, said) in [
-        ("arib-std-b67", Some("HLG")),
-        ("smpte2084", Some("PQ")),
+        ("arib-std-b67", Some(Curve::Hlg)),
+        ("smpte2084", Some(Curve::Pq)),
         ("bt709", None),
     ] {
-        let here = tempfile::tempdir().unwrap();
-        let video = write_video(&ffmpeg, here.path(), &[2], &["-color_trc", curve]);
+        // What filters' texts are made of, in the path.
+        let home = tempfile::tempdir().unwrap();
+        let here = home.path().join("it's [a], b:c;d");
+        fs::create_dir(&here).unwrap();
+        let at = |x: u32| COLORS[(x / 64).min(5) as usize];
+        for i in 0..8 {
+            let picture: ImageBuffer<Rgb<u16>, _> = ImageBuffer::from_fn(384, 64, |x, y| {
+                // What moves, for frames to differ.
+                let is_mark = (8 * i..8 * i + 8).contains(&y) && x % 64 < 8;
+                Rgb(stored(if is_mark { [90; 3] } else { at(x) }, curve))
+            });
+            picture.save(here.join(format!("{i}.png"))).unwrap();
+        }
+        let video = here.join("film.mkv");
+        let tagged = format!(
+            "-vf scale=out_color_matrix=bt2020:out_range=tv,format=yuv444p10le -c:v ffv1 -color_range tv -color_trc \
+             {curve} -colorspace bt2020nc -color_primaries bt2020"
+        );
+        let pictures = here.join("%d.png");
+        let mut words: Vec<&str> = "-y -v error -framerate 8 -start_number 0 -i"
+            .split(' ')
+            .collect();
+        words.push(pictures.to_str().unwrap());
+        words.extend(tagged.split(' '));
+        words.push(video.to_str().unwrap());
+        ffmpeg.run(&words, &here.join("log"), &mut |_| {}).unwrap();
         let mut told = None;
         let mut on_progress = |progress| match progress {
             VideoProgress::HighDynamicRange(curve) => told = Some(curve),
@@ -551,9 +616,22 @@ fn what_frames_do_not_show_of_a_high_dynamic_range_is_told() {
             _ => {}
         };
         let (count, shape) = (FrameCount::Frames(2), FrameShape::Square);
-        let photos = here.path().join("photos");
-        video::extract(&ffmpeg, &video, count, shape, &photos, &mut on_progress).unwrap();
+        let photos = here.join("photos");
+        let frames =
+            video::extract(&ffmpeg, &video, count, shape, &photos, &mut on_progress).unwrap();
         assert_eq!(told, said, "{curve}");
+        let left = fs::read_dir(&photos).unwrap().count();
+        assert_eq!(left, frames.len() + 1, "frames and their list");
+        let picture = image::open(photos.join(&frames[0].name))
+            .unwrap()
+            .into_rgb8();
+        for (k, color) in (0..).zip(COLORS) {
+            let shown = picture.get_pixel(64 * k + 32, 32).0;
+            let off = (0..3).map(|c| shown[c].abs_diff(color[c])).max().unwrap();
+            if said.is_some() {
+                assert!(off <= 3, "{curve}: {shown:?} for {color:?}");
+            }
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use super::output::say;
 use super::session::{progress, spinner};
 use calibrate::colmap::run::{self, Event, Matching, Options, Outcome, Step};
 use capture::unread_photos;
-use capture::video::{self, Damage, FrameCount, FrameShape, VideoFrame, VideoProgress};
+use capture::video::{self, Curve, Damage, FrameCount, FrameShape, VideoFrame, VideoProgress};
 use clap::ValueEnum;
 use indicatif::ProgressBar;
 use lumigraph::scene::{Aside, Scene};
@@ -178,11 +178,10 @@ const DEINTERLACED: &str =
     "its frames are interlaced, every other line at another moment, and are deinterlaced";
 
 /// What is said of a video of a high dynamic range.
-fn high_dynamic_range(curve: &str) -> String {
+fn high_dynamic_range(curve: Curve) -> String {
     format!(
-        "its colours are HDR ({curve}), which frames show pale and flat; convert it before, for one by `ffmpeg -i VIDEO -vf \
-         zscale=t=linear:npl=203,format=gbrpf32le,zscale=p=bt709,tonemap=mobius,zscale=t=bt709:m=bt709:r=tv,\
-         format=yuv420p SDR.mp4`"
+        "its colours are HDR ({curve}), and frames are brought to the range of photos: what is brighter than white paper \
+         comes close to white"
     )
 }
 

@@ -21,6 +21,7 @@ mod damage;
 mod error;
 mod film;
 mod list;
+mod range;
 mod scan;
 mod shape;
 
@@ -29,11 +30,13 @@ pub use damage::Damage;
 pub use error::VideoError;
 pub use film::{FILMS, FilmError, encode, is_film};
 pub use list::VideoFrame;
+pub use range::Curve;
 pub use scan::{scan, sharpness};
 pub use shape::FrameShape;
 
 use crate::Tool;
 use crate::folder::{beside, place_of, take_place};
+use range::HighRange;
 use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs;
@@ -60,8 +63,8 @@ pub enum VideoProgress {
     },
     /// Its frames are interlaced, and are made whole ones.
     Deinterlaced,
-    /// Its colours are of a high dynamic range, which frames do not show as players do; by which curve they are stored.
-    HighDynamicRange(&'static str),
+    /// Its colours are of a high dynamic range, stored by this curve, and are brought to that of photos.
+    HighDynamicRange(Curve),
     /// So many of the chosen frames are being written.
     Writing {
         /// How many in all.
@@ -96,7 +99,8 @@ const EXACT: &str = "flags=bicubic+accurate_rnd+full_chroma_int+full_chroma_inp"
 /// are predicted from them. Where that leaves one photo of several, they are taken of the time of the
 /// whole frames ([`choose()`]). Two extractions at once into one folder take each other's frames away: whoever starts
 /// them keeps them apart ([`hold_now`](crate::hold::hold_now)). Frames whose pixels are not square are drawn out as `shape` says.
-/// Interlaced ones are deinterlaced before they are scored, but for those of an earlier run, which stay as they are.
+/// Interlaced ones are deinterlaced before they are scored, and those of a high dynamic range brought to that of photos, but for
+/// those of an earlier run, which stay as they are.
 ///
 /// # Errors
 /// `ffmpeg` is missing or fails; a file that is no video or has but one whole frame, or whose pictures change in size on
@@ -154,8 +158,8 @@ pub fn extract(
     if scanned.is_interlaced {
         report(VideoProgress::Deinterlaced);
     }
-    if let Some(curve) = scanned.curve {
-        report(VideoProgress::HighDynamicRange(curve));
+    if let Some(range) = &scanned.range {
+        report(VideoProgress::HighDynamicRange(range.curve));
     }
     let chosen = choose(&scored, count);
     if chosen.len() < 2 {
@@ -190,9 +194,13 @@ pub fn extract(
     }
     fs::create_dir_all(&partial).map_err(failed(&partial))?;
     let from = scan::input(video, scanned.decoding);
-    let size = stretched.map(|(_, to)| to);
-    let whole = scanned.deinterlaced();
-    let written = write_frames(ffmpeg, spelling, from, &chosen, whole, size, &partial);
+    let drawing = Drawing {
+        chosen: &chosen,
+        whole: scanned.deinterlaced(),
+        range: scanned.range.as_ref(),
+        size: stretched.map(|(_, to)| to),
+    };
+    let written = write_frames(ffmpeg, spelling, from, &drawing, &partial);
     if written.is_err() {
         // It would keep a full disk full.
         let _ = fs::remove_dir_all(&partial);
@@ -232,31 +240,43 @@ pub fn would_stay(
     Ok(list::read(folder, &source, shape).is_some() || !list::may_replace(folder))
 }
 
-/// Writes the frames of these indices, which rise, as 1.jpg, 2.jpg, …, drawn out to a size if one is given. `arguments`
-/// say of which video, and `whole` begins the filter.
+/// Which frames are written, and how.
+struct Drawing<'a> {
+    /// Their indices, which rise.
+    chosen: &'a [usize],
+    /// Begins the filter: see [`scan::Scan::deinterlaced`].
+    whole: &'a str,
+    range: Option<&'a HighRange>,
+    /// To draw them out to.
+    size: Option<(u32, u32)>,
+}
+
+/// Writes frames as 1.jpg, 2.jpg, …; `arguments` say of which video.
 fn write_frames(
     ffmpeg: &Tool,
     spelling: scan::Spelling,
     mut arguments: Vec<OsString>,
-    chosen: &[usize],
-    whole: &str,
-    size: Option<(u32, u32)>,
+    drawing: &Drawing<'_>,
     folder: &Path,
 ) -> Result<(), VideoError> {
     // 1. The filter, in a file: an argument must not be as long as many frames make it.
+    let [filter_file, table_file] = ["filter.txt", "table.cube"].map(|name| folder.join(name));
+    let write =
+        |file: &Path, content: &[u8]| fs::write(file, content).map_err(VideoError::write_at(file));
+    let mut filter =
+        format!("{}select='{}',", drawing.whole, is_any_of(drawing.chosen)).into_bytes();
+    if let Some(range) = drawing.range {
+        write(&table_file, range.table().as_bytes())?;
+        filter.extend(range.filter(&in_filter(&table_file), EXACT));
+    }
     // JPEG's colours are BT.601 in full range whatever the video's are.
-    let (size, square) = match size {
+    let (size, square) = match drawing.size {
         Some((width, height)) => (format!("w={width}:h={height}:"), ",setsar=1"),
         None => (String::new(), ""),
     };
     let scale = format!("scale={size}out_color_matrix=bt601:out_range=full:{EXACT}{square}");
-    let filter = format!(
-        "{whole}select='{}',{scale},format=yuvj420p",
-        is_any_of(chosen)
-    );
-    let filter_file = folder.join("filter.txt");
-    let failed = VideoError::write_at(&filter_file);
-    fs::write(&filter_file, filter).map_err(&failed)?;
+    filter.extend(format!("{scale},format=yuvj420p").as_bytes());
+    write(&filter_file, &filter)?;
 
     // 2. The frames.
     arguments.extend([spelling.filter_file.into(), scan::file(&filter_file)]);
@@ -265,7 +285,31 @@ fn write_frames(
     arguments.extend(quality.split(' ').map(Into::into));
     arguments.push(scan::file(&literal(folder).join("%d.jpg")));
     ffmpeg.stream(&arguments, &mut |_| {}, |_| Ok(()))?;
-    fs::remove_file(&filter_file).map_err(failed)
+    for file in [&filter_file, &table_file]
+        .into_iter()
+        .filter(|file| file.exists())
+    {
+        fs::remove_file(file).map_err(VideoError::write_at(file))?;
+    }
+    Ok(())
+}
+
+/// A file's path as a filter's option takes it: what means something to options, and then what does to filters, is marked.
+fn in_filter(path: &Path) -> Vec<u8> {
+    // What begins a value, were it white, would be cut off.
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let marked = |bytes: &[u8], special: &[u8]| {
+        let mut text = Vec::with_capacity(bytes.len());
+        for byte in bytes {
+            if special.contains(byte) {
+                text.push(b'\\');
+            }
+            text.push(*byte);
+        }
+        text
+    };
+    let option = marked(path.as_os_str().as_encoded_bytes(), br"\':");
+    marked(&option, br"\'[],;")
 }
 
 /// What frames' files are called: by their times in seconds, to the millisecond, or to as many

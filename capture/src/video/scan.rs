@@ -1,4 +1,5 @@
 use super::damage::{Damage, Log};
+use super::range::HighRange;
 use super::shape::Shape;
 use super::{ScoredFrame, VideoError, VideoProgress};
 use crate::{Tool, ToolError};
@@ -43,8 +44,8 @@ pub(super) struct Scan {
     pub(super) is_jpeg_like: bool,
     /// Whether most of its frames are interlaced, and were deinterlaced before they were scored.
     pub(super) is_interlaced: bool,
-    /// By which curve its colours are stored, if they are of a high dynamic range.
-    pub(super) curve: Option<&'static str>,
+    /// How its colours are stored, if they are of a high dynamic range.
+    pub(super) range: Option<HighRange>,
     /// How they were decoded: to have the same ones again, as many of a damaged video.
     pub(super) decoding: Decoding,
 }
@@ -60,15 +61,12 @@ impl Scan {
 
     /// Whether frames are as the first version of this program made them.
     pub(super) fn is_as_in_first_version(&self) -> bool {
-        self.is_jpeg_like && !self.is_interlaced
+        self.is_jpeg_like && !self.is_interlaced && self.range.is_none()
     }
 }
 
 /// See [`Scan::deinterlaced`].
 const DEINTERLACED: &str = "bwdif=mode=send_frame:deint=interlaced,";
-
-/// What `showinfo` calls curves of colours of a high dynamic range, and people do.
-const CURVES: [(&str, &str); 2] = [("arib-std-b67", "HLG"), ("smpte2084", "PQ")];
 
 /// How ffmpeg decodes.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -120,16 +118,17 @@ fn scan_once(
     let mut shape = None;
     let mut colors = JpegColors::default();
     let mut is_text = false;
-    let (mut interlaced, mut curve) = (0, None);
+    let (mut interlaced, mut range) = (0, None);
     // Where the filters were made anew, and count from zero again.
     let mut changed_s = None;
     let mut on_line = |line: &str| {
         log.read(line);
         colors.read(line);
         is_text |= line.starts_with(OF_TEXT);
-        if let Some(found) = told(line, " color_trc:") {
-            let known = CURVES.into_iter().find(|(name, _)| *name == found);
-            curve = curve.or(known.map(|(_, name)| name));
+        if let Some(curve) = told(line, " color_trc:") {
+            let known = |key| told(line, key).unwrap_or("unknown");
+            let [primaries, matrix] = [" color_primaries:", " color_space:"].map(known);
+            range = range.or_else(|| HighRange::new(curve, primaries, matrix));
         }
         let Some(time_s) = shown_at_s(line) else {
             return;
@@ -188,7 +187,7 @@ fn scan_once(
         shape,
         is_jpeg_like: colors.are_all(),
         is_interlaced: 2 * interlaced > count,
-        curve,
+        range,
         decoding,
     })
 }
