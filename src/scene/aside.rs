@@ -168,6 +168,8 @@ mod tests {
         // Killed when other frames had come.
         Aside::put(folder).unwrap().unwrap();
         frames(folder, "new");
+        let error = Scene::open(folder, false).unwrap_err();
+        assert!(matches!(error, SceneError::Aside { .. }), "{error}");
         Aside::left(folder).unwrap().put_back().unwrap();
         let failed = folder.join(".photos.replaced-failed");
         fs::remove_dir_all(&failed).unwrap();

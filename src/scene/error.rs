@@ -21,6 +21,16 @@ pub enum SceneError {
         /// Where it was looked for.
         source: calibrate::colmap::ColmapError,
     },
+    /// A folder's scene is not in its place, as an import is at work there or was stopped.
+    #[error(
+        "{}: the scene lies aside, as an import that replaces it is at work here or was stopped; wait until it has \
+         ended, or run it again: it goes on, or where it fails puts the scene back",
+        folder.display()
+    )]
+    Aside {
+        /// The folder.
+        folder: PathBuf,
+    },
     /// An OpenCV calibration cannot be read.
     #[error(transparent)]
     OpenCv(#[from] calibrate::opencv::OpenCvError),

@@ -1,9 +1,11 @@
 //! The surface that was made for a scene, and that its folder holds.
 
 use super::file::{Extra, ProxyEntry};
-use super::parts::{PROXY_FILE, PROXY_MESH, SCENE_FILE};
-use super::store::{io, make_within, write_json};
+use super::parts::{PROXY_FILE, PROXY_MESH, SCENE_FILE, scene_file};
+use super::put_back::works;
+use super::store::{hold_above, io, make_within, write_json};
 use super::{Scene, SceneError};
+use capture::hold::{hold, hold_now};
 use capture::{as_argument, without_byte_order_mark};
 use proxy::Proxy;
 use std::collections::BTreeSet;
@@ -101,7 +103,11 @@ impl Scene {
         };
         let name = proxy_file(&proxy);
         let path = folder.join(name);
-        let before = self.proxy.as_ref().map(|own| own.file.clone());
+        // Of two that do so at once each would find half of the other's.
+        let _held = hold_above(&folder);
+        remove_left(&folder);
+        let named = scene_file(&folder).and_then(|file| file.proxy);
+        let before = named.map(|own| own.file);
         if before.as_deref() != Some(name) && path.symlink_metadata().is_ok() {
             return Err(SceneError::Occupied {
                 problem: "the scene does not name it, and it would be replaced; move it away, or give a file with -o"
@@ -112,6 +118,8 @@ impl Scene {
 
         // 1. Both files, in a folder that goes away on errors.
         let (made, new) = make_within(&folder)?;
+        // So that no other takes what is there meanwhile for what is left of one that was killed.
+        let _alive = hold(made.path());
         proxy::write(&new.join(name), &proxy, &[], &[])?;
         let other = self.proxy.as_ref().map(|own| own.other.clone());
         let own = SceneProxy {
@@ -134,11 +142,15 @@ impl Scene {
         whole.insert("proxy".to_owned(), entry);
         write_json(&new.join(SCENE_FILE), &whole)?;
 
-        // 2. They take their places.
+        // 2. They take their places. Under another name the one before is nobody's then.
+        let before = before.filter(|before| before != name && is_proxy_file(before));
+        if let Some(before) = &before {
+            let text = format!("{name}\n{before}\n");
+            let left = made.path().join(LEFT);
+            std::fs::write(&left, text).map_err(|e| io(&left, "write", e))?;
+        }
         replace(&path, &file, made, &new).map_err(|e| io(&path, "replace the proxy", e))?;
         self.proxy = Some(own);
-        // 3. Under another name the one before is nobody's.
-        let before = before.filter(|before| before != name && is_proxy_file(before));
         if let Some(before) = before {
             let _ = std::fs::remove_file(folder.join(before));
         }
@@ -146,32 +158,155 @@ impl Scene {
     }
 }
 
+/// In the folder that a proxy is made in: the names of two, of which the scene names one, and the other goes.
+const LEFT: &str = "proxies.txt";
+
+/// Removes a proxy that the scene does not name where one that replaced it, or was to be replaced by it, was killed. Where
+/// folders cannot be locked nothing tells that from one at work, and nothing is done.
+pub(super) fn remove_left(folder: &Path) {
+    for work in works(folder).unwrap_or_default() {
+        let Ok(names) = std::fs::read_to_string(work.join(LEFT)) else {
+            continue;
+        };
+        let Ok(Some(_held)) = hold_now(&work) else {
+            continue;
+        };
+        let own = scene_file(folder).and_then(|file| file.proxy);
+        let Some(own) = own.filter(|own| folder.join(&own.file).is_file()) else {
+            continue;
+        };
+        for name in names
+            .lines()
+            .filter(|name| is_proxy_file(name) && *name != own.file)
+        {
+            let _ = std::fs::remove_file(folder.join(name));
+        }
+        let _ = std::fs::remove_dir_all(&work);
+    }
+}
+
 /// Has a new proxy and a new `scene.json`, which lie in `new`, take the places of others, or neither.
 ///
-/// The proxy is the first to leave and the last to come: killed meanwhile, the scene lacks it, but never says of one
-/// what holds of another. And there is a `scene.json` at every moment, which [`capture::folder::exchange`] takes away
-/// for one.
+/// There is a `scene.json` at every moment, which [`capture::folder::exchange`] takes away for one. Where there is no proxy of
+/// that name the new one comes first, and the scene always has the one that it names. Else the old one is the first to leave
+/// and the new one the last to come: killed meanwhile, the scene lacks it, but never says of one what holds of another.
 fn replace(proxy: &Path, scene: &Path, made: TempDir, new: &Path) -> std::io::Result<()> {
     if proxy.is_dir() {
         let text = "a folder is in its place: move it away";
         return Err(std::io::Error::other(text));
     }
     let [old_proxy, old_scene] = ["old-proxy", "old-scene"].map(|name| made.path().join(name));
-    std::fs::copy(scene, &old_scene)?;
-    let is_replaced = proxy.symlink_metadata().is_ok();
-    if is_replaced {
-        std::fs::rename(proxy, &old_proxy)?;
-    }
     let in_new = |path: &Path| new.join(path.file_name().unwrap_or_default());
+    if proxy.symlink_metadata().is_err() {
+        std::fs::rename(in_new(proxy), proxy)?;
+        return std::fs::rename(in_new(scene), scene).inspect_err(|_| {
+            // The first error is the one to tell.
+            let _ = std::fs::remove_file(proxy);
+        });
+    }
+    std::fs::copy(scene, &old_scene)?;
+    std::fs::rename(proxy, &old_proxy)?;
     let exchanged =
         std::fs::rename(in_new(scene), scene).and_then(|()| std::fs::rename(in_new(proxy), proxy));
     if exchanged.is_err() {
-        // The first error is the one to tell.
         let _ = std::fs::rename(&old_scene, scene);
-        if is_replaced && std::fs::rename(&old_proxy, proxy).is_err() {
+        if std::fs::rename(&old_proxy, proxy).is_err() {
             // It is all that is left of it.
             let _ = made.keep();
         }
     }
     exchanged
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::wall;
+    use super::*;
+    use glam::DVec3;
+    use proxy::Plane;
+    use std::fs;
+
+    fn plane() -> Proxy {
+        Proxy::Plane(Plane::new(DVec3::Z, DVec3::NEG_Z).unwrap())
+    }
+
+    /// Of two that lie in a scene's folder it names one.
+    #[test]
+    fn what_a_killed_one_has_left_is_in_nobodys_way() {
+        let (home, capture) = wall(2, 1);
+        let folder = home.path().join("scene");
+        let (mut scene, _) = Scene::open(&capture, false).unwrap();
+        scene.save(&folder, false).unwrap();
+        scene.set_proxy(plane(), None).unwrap();
+        let names = || -> BTreeSet<String> {
+            let entries = fs::read_dir(&folder).unwrap();
+            let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+            names.collect()
+        };
+        let whole = names();
+        let work = folder.join(".lumigraph-abc");
+        let kill = || {
+            fs::create_dir(&work).unwrap();
+            fs::write(work.join(LEFT), "proxy.ply\nproxy.json\n").unwrap();
+        };
+
+        // 1. Killed before the scene named the new one, which is then gone; but not while it is at work.
+        let mesh = folder.join(PROXY_MESH);
+        fs::write(&mesh, "new").unwrap();
+        assert!(matches!(
+            Scene::check_free(&folder, true),
+            Err(SceneError::Occupied { .. })
+        ));
+        kill();
+        let held = hold_now(&work);
+        if !matches!(held, Ok(Some(_))) {
+            eprintln!("SKIPPED: no folder can be held here");
+            return;
+        }
+        Scene::put_back(&folder).unwrap();
+        assert!(mesh.exists());
+        drop(held);
+        Scene::put_back(&folder).unwrap();
+        assert_eq!(names(), whole);
+
+        // 2. Killed before the old one was gone.
+        let file = folder.join(SCENE_FILE);
+        let text = fs::read_to_string(&file).unwrap();
+        fs::write(&file, text.replace(PROXY_FILE, PROXY_MESH)).unwrap();
+        fs::write(&mesh, "new").unwrap();
+        kill();
+        let (mut scene, _) = Scene::open(&folder, false).unwrap();
+        scene.set_proxy(plane(), None).unwrap();
+        assert_eq!(names(), whole);
+        assert_eq!(fs::read_to_string(&file).unwrap(), text);
+
+        // 3. What nobody was at work with is somebody's own.
+        fs::write(&mesh, "mine").unwrap();
+        scene.set_proxy(plane(), None).unwrap();
+        assert_eq!(fs::read_to_string(&mesh).unwrap(), "mine");
+    }
+
+    #[test]
+    fn scenes_that_are_saved_at_once_are_one_of_them() {
+        let (home, capture) = wall(3, 1);
+        for round in 0..8 {
+            let folder = home.path().join(format!("scene-{round}"));
+            let save = || {
+                let (mut scene, _) = Scene::open(&capture, false).unwrap();
+                let saved = scene.save_undistorted(&folder, false, false, false, &|| {});
+                saved.map(|_| ()).map_err(|error| error.to_string())
+            };
+            let saved = std::thread::scope(|scope| {
+                let threads = [scope.spawn(save), scope.spawn(save)];
+                threads.map(|thread| thread.join().unwrap())
+            });
+            assert_eq!(
+                saved.iter().filter(|saved| saved.is_ok()).count(),
+                1,
+                "{saved:?}"
+            );
+            let (scene, _) = Scene::open(&folder, true).unwrap();
+            assert!(scene.photos.iter().all(|photo| photo.path.is_file()));
+        }
+    }
 }

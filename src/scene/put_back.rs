@@ -1,11 +1,12 @@
 //! What an import leaves that was killed while its scene's parts took their places, some renames long.
 
 use super::file::{PhotoEntry, SceneFile};
+use super::own::remove_left;
 use super::parts::{MODEL_FOLDER, PARTS, SCENE_FILE, WORK_PREFIX, scene_file};
 use super::store::io;
 use super::{Scene, SceneError};
 use capture::hold::hold_now;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// In the folder that a scene is made in: the new one's parts that have not taken their places.
 pub(super) const NEW_FOLDER: &str = "scene";
@@ -16,22 +17,19 @@ impl Scene {
     /// Where an import was killed as the parts of its scene took their places in a folder, puts those of the scene of
     /// before back, and removes those of the new one. Whether there was one before. Killed meanwhile, it goes on where it
     /// was. Where folders cannot be locked nothing tells such an import from one that is at work, and nothing is done.
+    /// Of a scene, removes the proxy that it does not name where `proxy` was killed as one took the place of another.
     ///
     /// # Errors
     /// Something cannot be listed or moved.
     pub fn put_back(folder: &Path) -> Result<bool, SceneError> {
-        if !folder.is_dir() || Self::is_scene(folder) {
+        if !folder.is_dir() {
             return Ok(false);
         }
-        let list = |error| io(folder, "list the folder", error);
-        let mut works = Vec::new();
-        for entry in std::fs::read_dir(folder).map_err(list)? {
-            let name = entry.map_err(list)?.file_name();
-            if name.to_string_lossy().starts_with(WORK_PREFIX) {
-                works.push(folder.join(name));
-            }
+        if Self::is_scene(folder) {
+            remove_left(folder);
+            return Ok(false);
         }
-        works.sort();
+        let works = works(folder).map_err(|e| io(folder, "list the folder", e))?;
         for work in works {
             if put_back_from(&work, folder)? {
                 return Ok(true);
@@ -39,6 +37,27 @@ impl Scene {
         }
         Ok(false)
     }
+}
+
+/// Whether a folder holds what an import leaves that was killed, or is still at work, as one scene took the place of
+/// another: neither is there.
+pub(super) fn is_between_scenes(folder: &Path) -> bool {
+    let works = works(folder).unwrap_or_default();
+    let is_old = |work: &PathBuf| is_there(&work.join(OLD_FOLDER).join(SCENE_FILE));
+    !Scene::is_scene(folder) && works.iter().any(is_old)
+}
+
+/// The folders within one that scenes, or proxies, for it are made in, in order.
+pub(super) fn works(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let mut works = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        let name = entry?.file_name();
+        if name.to_string_lossy().starts_with(WORK_PREFIX) {
+            works.push(folder.join(name));
+        }
+    }
+    works.sort();
+    Ok(works)
 }
 
 /// The same of one folder that a scene was made in.
@@ -98,7 +117,6 @@ mod tests {
     use super::super::undistort::IMAGES_FOLDER;
     use super::*;
     use std::fs;
-    use std::path::PathBuf;
 
     /// A folder with a scene's photo and model, as an import that is killed before its file comes leaves it, and the
     /// folder that it was made in.

@@ -10,6 +10,7 @@ use calibrate::colmap;
 use capture::folder::exchange;
 use capture::hold::hold;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -169,7 +170,7 @@ impl Scene {
         Self::check_apart(folder, self.inputs())?;
         let is_missing = |path: &&Path| !path.as_os_str().is_empty() && !path.exists();
         let missing: Vec<&Path> = folder.ancestors().take_while(is_missing).collect();
-        let written = self.write_parts(folder, fill);
+        let written = self.write_parts(folder, replace, fill);
         if written.is_err() {
             for path in missing {
                 // One that is not empty stays.
@@ -232,6 +233,7 @@ impl Scene {
     fn write_parts(
         &mut self,
         folder: &Path,
+        replace: bool,
         fill: impl FnOnce(&mut Self, &Path) -> Result<(), SceneError>,
     ) -> Result<(), SceneError> {
         // 1. Everything into a folder within it, which goes away on errors.
@@ -247,7 +249,10 @@ impl Scene {
         }
         self.write_file(&new.join(SCENE_FILE), folder)?;
 
-        // 2. They take their places.
+        // 2. They take their places, if no other scene has meanwhile. Of two that do so at once one would take the other's
+        // parts away, and take those that it puts back for its own.
+        let _exchanging = hold_above(folder);
+        Self::check_free(folder, replace)?;
         let old = made.path().join(OLD_FOLDER);
         std::fs::create_dir(&old).map_err(|e| io(&old, "make the folder", e))?;
         let exchanged = exchange(&PARTS, &new, folder, &old);
@@ -314,6 +319,12 @@ pub(super) fn make_within(folder: &Path) -> Result<(TempDir, PathBuf), SceneErro
     let new = made.path().join(NEW_FOLDER);
     std::fs::create_dir(&new).map_err(|e| io(&new, "make the folder", e))?;
     Ok((made, new))
+}
+
+/// Holds the folder that a scene's lies in: the scene's own an import may hold as COLMAP works there. For as long as
+/// parts of the scene change places; see [`hold`] for what `None` is.
+pub(super) fn hold_above(scene: &Path) -> Option<File> {
+    hold(scene.canonicalize().ok()?.parent()?)
 }
 
 /// Into a folder in the making.

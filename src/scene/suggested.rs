@@ -1,6 +1,7 @@
 //! Captures opened without `import`: of options that messages suggest they say whose they are.
 
-use super::{ImportOptions, Scene, SceneError, Warning};
+use super::put_back::is_between_scenes;
+use super::{Aside, ImportOptions, Scene, SceneError, Warning};
 use calibrate::opencv::Keys;
 use capture::as_argument;
 use std::path::Path;
@@ -15,12 +16,17 @@ impl Scene {
     /// those for `keys` where it gives them. Messages that suggest others say that `import` has them.
     ///
     /// # Errors
-    /// As for [`Scene::import`].
+    /// As for [`Scene::import`]; the folder's scene lies aside, while an import replaces it.
     pub fn open_capture(
         capture: &Path,
         strict: bool,
         keys: Option<&Keys>,
     ) -> Result<(Self, Vec<Warning>), SceneError> {
+        if Aside::left(capture).is_some() || is_between_scenes(capture) {
+            return Err(SceneError::Aside {
+                folder: capture.to_owned(),
+            });
+        }
         let options = ImportOptions {
             strict,
             keys: keys.cloned().unwrap_or_default(),

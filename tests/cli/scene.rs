@@ -309,6 +309,8 @@ fn a_scene_that_was_to_be_replaced_is_put_back_where_that_was_killed() {
         let all = parts(before).len() + parts(after).len();
         for renames in 1..all {
             assert_eq!(kill(Some(before), after, renames), all);
+            let error = lumigraph(here, "info scene").error(1);
+            assert!(error.contains("scene: the scene lies aside"), "{error}");
             let ran = lumigraph(here, "import wall -o scene");
             let said = "note: scene: an import was stopped as its scene took the place of another here; that one is back";
             assert!(ran.stderr.contains(said), "{}", ran.stderr);
