@@ -8,6 +8,7 @@ use super::options::{HoldOutArgs, SceneArgs, triple};
 use super::output::{make_parent, print, say};
 use super::surface::{fit, proxy_text};
 use super::targets::{check_apart, check_file, check_file_in_no_part, check_scene_folder};
+use ::proxy::mesh::Coarse;
 use ::proxy::{FileError, Form, MeshKind, Plane, Proxy, Solid, mesh, plane_focused_on};
 use anyhow::{Context, bail};
 use calibrate::{Pixel, View};
@@ -289,13 +290,20 @@ fn by_hand(
     }
     if let Some(file) = &args.mesh {
         let mut mesh = mesh::read(file)?;
+        let coarse = Coarse::of(&mesh);
+        if let Some(coarse) = &coarse {
+            say!(
+                "warning: {}: {coarse}, and give --transform",
+                file.display()
+            );
+        }
         if let Some(transform) = &args.transform {
             mesh.transform(transform);
         }
         let views = scene.views(&scene.names())?;
         let solid = Solid::new(MeshKind::Mesh, mesh);
         let share = mesh::lies_where_cameras_look(&solid, &views);
-        if share < LEAST_SEEN {
+        if share < LEAST_SEEN && coarse.is_none() {
             say!(
                 "warning: only {:.1} % of what the photos look at meets the mesh; give \
                  --transform if its axes or units are not the scene's",

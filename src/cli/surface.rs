@@ -10,6 +10,7 @@ use clap::Args;
 use glam::DVec3;
 use lumigraph::scene::{Fitted, Kind, Scene, SceneError, SceneProxy, Trial, trials_text};
 use proxy::Proxy;
+use proxy::mesh::Coarse;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -146,6 +147,13 @@ impl ProxyArgs {
             Some(file) if is_proxy_file(file) => {
                 let proxy = proxy::read(Path::new(file))?;
                 scene.check_proxy(&proxy, Path::new(file))?;
+                if let Proxy::Mesh(solid) = &proxy
+                    && let Some(coarse) = Coarse::of(solid.mesh())
+                {
+                    say!(
+                        "warning: {file}: {coarse}, and give it to `lumigraph proxy SCENE mesh FILE --transform …`"
+                    );
+                }
                 if !without.is_empty() {
                     say!(
                         "note: nothing tells whether {file} was fitted with held-out photos, too; \

@@ -35,6 +35,28 @@ fn the_best_kind_is_chosen_by_photos_held_out_for_it() {
 }
 
 #[test]
+fn a_mesh_that_its_numbers_have_lost_is_told_and_why() {
+    let folder = with_wall();
+    lumigraph(folder.path(), "import wall -o scene").ok();
+    // A square of the size of 32 bits' steps there.
+    let corners = [(0.0, 0.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)];
+    let line = |(x, y)| format!("v {} {} 100\n", 500_000.0 + x, 5_000_000.0 + y);
+    let text = corners.map(line).concat() + "f 1 2 3 4\n";
+    std::fs::write(folder.path().join("far.obj"), text).unwrap();
+    let lost = "far.obj: its corners lie up to 5000000 from the origin, where its numbers are 0.5 apart or more";
+    let ran = lumigraph(folder.path(), "proxy scene mesh far.obj -o far.ply").ok();
+    assert!(ran.stderr.contains(lost), "{}", ran.stderr);
+    assert!(
+        !ran.stderr.contains("if its axes or units"),
+        "{}",
+        ran.stderr
+    );
+    let line = "render wall --proxy far.obj --path sweep --frames 1 --size 24x18 -o out";
+    let ran = lumigraph(folder.path(), line).ok();
+    assert!(ran.stderr.contains(lost), "{}", ran.stderr);
+}
+
+#[test]
 fn a_scene_keeps_any_kind_and_draws_from_it() {
     let folder = with("shelf");
     lumigraph(folder.path(), "import shelf -o scene").ok();

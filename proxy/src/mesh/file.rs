@@ -1,6 +1,6 @@
 //! Mesh files by their extension.
 
-use super::{ExportError, Mesh, MeshFileError, Model, gltf, obj, ply, to_glb, to_ply};
+use super::{Coarse, ExportError, Mesh, MeshFileError, Model, gltf, obj, ply, to_glb, to_ply};
 use calibrate::View;
 use std::path::{Path, PathBuf};
 
@@ -57,7 +57,10 @@ pub fn read_model(path: &Path) -> Result<(Model, Vec<String>), MeshFileError> {
 /// # Errors
 /// As for [`read_model`].
 pub fn parse_model(path: &Path, bytes: &[u8]) -> Result<(Model, Vec<String>), MeshFileError> {
-    gltf::parse_model(path, bytes)
+    let (model, mut warnings) = gltf::parse_model(path, bytes)?;
+    let coarse = Coarse::of(&model.mesh);
+    warnings.extend(coarse.map(|coarse| format!("{coarse}, with that as a node's translation")));
+    Ok((model, warnings))
 }
 
 /// The files beside a .glb or .gltf file that it has buffers and pictures in, by their paths, whether or not

@@ -1,5 +1,6 @@
 //! Triangle meshes, and the files that hold them.
 
+mod coarse;
 mod coloring;
 mod error;
 mod file;
@@ -20,6 +21,7 @@ mod simplify;
 mod skin;
 mod texture;
 
+pub use coarse::Coarse;
 pub use coloring::{Coloring, FEW, Neighbours};
 pub use error::{ExportError, MeshFileError};
 pub use file::{files_beside, parse, parse_model, read, read_model, write};
