@@ -295,6 +295,13 @@ fn for_each_line(stream: impl Read, mut each: impl FnMut(&str)) -> io::Result<()
 pub fn fingerprint(path: &Path) -> io::Result<String> {
     let file = fs::metadata(path)?;
     let modified = file.modified()?.duration_since(std::time::UNIX_EPOCH);
-    let modified_ns = modified.map_or(0, |since| since.as_nanos());
-    Ok(format!("{} bytes of {modified_ns} ns", file.len()))
+    let (sign, span) = match modified {
+        Ok(after) => ("", after),
+        Err(before) => ("-", before.duration()),
+    };
+    Ok(format!(
+        "{} bytes of {sign}{} ns",
+        file.len(),
+        span.as_nanos()
+    ))
 }

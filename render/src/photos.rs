@@ -471,8 +471,13 @@ impl PhotoStore {
         }
         // An error is kept for whoever asks.
         let _ = self.find_or_decode(source_idx, 0, |shelf, photo| {
-            // A frame that began meanwhile may have taken the room.
-            if shelf.slots[source_idx].awaited == bytes {
+            // A frame that began meanwhile may have taken the room, or wait for some levels of the photo alone.
+            let (slot, more) = (&shelf.slots[source_idx], shelf.awaited + bytes);
+            let has_room = match slot.awaited {
+                0 => slot.photo.is_none() && shelf.residency.allows(shelf.residency.held + more),
+                awaited => awaited == bytes,
+            };
+            if has_room {
                 shelf.put(source_idx, Some(Arc::clone(photo)));
             }
         });

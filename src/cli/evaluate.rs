@@ -248,24 +248,13 @@ fn mean_line(lines: &[Line]) -> Option<Line> {
     })
 }
 
-/// A line; PSNR and SSIM are `null` where neither photo nor picture shows anything.
-fn line_json(line: &Line) -> Value {
-    let mut json = json!(line);
-    if line.scores.is_of_nothing() {
-        for key in ["psnr", "psnr_exposed", "ssim"] {
-            json[key] = Value::Null;
-        }
-    }
-    json
-}
-
 fn json(session: &Session, lines: &[Line], report: &Report) -> Value {
-    let mut mean = json!(mean_line(lines).as_ref().map(line_json));
+    let mut mean = json!(mean_line(lines));
     if let Some(mean) = mean.as_object_mut() {
         mean.remove("name");
     }
     json!({
-        "photos": lines.iter().map(line_json).collect::<Vec<_>>(),
+        "photos": lines,
         "mean": mean,
         "proxy": session.proxy.json(),
         "exposure": session.exposure.json(),
@@ -302,6 +291,7 @@ fn table(lines: &[Line]) -> String {
             columns.extend([
                 ("psnr_masked", db(masked.map(|m| m.psnr_masked))),
                 ("ssim_masked", share(masked.and_then(|m| m.ssim_masked))),
+                ("coverage_masked", share(masked.map(|m| m.coverage_masked))),
             ]);
         }
         if any_matte {

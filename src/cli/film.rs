@@ -204,7 +204,10 @@ impl FilmArgs {
                 FILMS.map(|end| format!(".{end}")).join(", ")
             ))
             .into()),
-            made => made.context(named),
+            made => made.with_context(|| {
+                let folder = folder.path().display();
+                format!("{named}: cannot try it on two frames in {folder} (the variable TMPDIR names another)")
+            }),
         }
     }
 

@@ -52,6 +52,7 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches as _, Parser, Subcommand};
 use output::say;
 use std::fmt::Write as _;
+use std::io;
 use std::num::NonZero;
 use std::process::ExitCode;
 
@@ -124,7 +125,7 @@ pub(super) fn main() -> ExitCode {
     if output::is_closed_pipe(&error) {
         return ExitCode::SUCCESS;
     }
-    say!("error: {}", one_line(&error));
+    say!("error: {}{}", one_line(&error), remedy(&error));
     ExitCode::from(1)
 }
 
@@ -158,13 +159,30 @@ fn threads(text: &str) -> Result<NonZero<usize>, String> {
     }
 }
 
+/// What sets the number of worker threads where `--threads` does not.
+const THREADS_VARIABLE: &str = "RAYON_NUM_THREADS";
+
 /// At once, as later there is nobody to tell that no more threads can be had.
 fn start_threads(threads: Option<NonZero<usize>>) -> anyhow::Result<()> {
-    let threads = threads.map_or(0, NonZero::get);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+    let by_cores = std::thread::available_parallelism().map_or(1, NonZero::get);
+    let count = match threads {
+        Some(count) => count.get(),
+        None => threads_by_variable()?.unwrap_or(by_cores),
+    };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(count);
     pool.build_global().context(
         "worker threads cannot be started; try fewer --threads, or a higher limit (ulimit -u, -v)",
     )
+}
+
+/// The number that [`THREADS_VARIABLE`] holds, if it holds one that is not zero.
+fn threads_by_variable() -> anyhow::Result<Option<usize>> {
+    let text = std::env::var(THREADS_VARIABLE).unwrap_or_default();
+    let is_number = text.parse::<usize>().is_ok_and(|count| count > 0);
+    let count = is_number.then(|| threads(&text)).transpose();
+    let count =
+        count.map_err(|expected| Usage(format!("{THREADS_VARIABLE}={text}: {expected}")))?;
+    Ok(count.map(NonZero::get))
 }
 
 fn run(cli: Cli) -> anyhow::Result<()> {
@@ -186,6 +204,23 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         #[cfg(feature = "window")]
         Command::View(args) => view::run(&args),
         Command::Generate(args) => generate::run(&args),
+    }
+}
+
+/// What to do about an error of the system's, whichever file it met: that may have been a hidden one.
+fn remedy(error: &anyhow::Error) -> &'static str {
+    let mut causes = error
+        .chain()
+        .filter_map(|cause| cause.downcast_ref::<io::Error>());
+    let is_full = |cause: &io::Error| {
+        matches!(
+            cause.kind(),
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded
+        )
+    };
+    match causes.any(is_full) {
+        true => "; make room on that disk, or write to another",
+        false => "",
     }
 }
 

@@ -1,5 +1,6 @@
 //! Lines over an axis, as SVG.
 
+use render::interior::PortalFill;
 use std::fmt::Write;
 use std::ops::RangeInclusive;
 
@@ -19,7 +20,10 @@ pub(super) struct Line<'a> {
 const SIZE: (f64, f64) = (960.0, 420.0);
 /// Left, top, right and bottom of the axes.
 const ROOM: (f64, f64, f64, f64) = (64.0, 24.0, 24.0, 44.0);
-const COLORS: [&str; 5] = ["#c0392b", "#2c6fbb", "#2e8b57", "#b8860b", "#7d3c98"];
+/// As many as walks have lines: what portals show, and everything drawn.
+const COLORS: [&str; PortalFill::ALL.len() + 1] = [
+    "#c0392b", "#2c6fbb", "#2e8b57", "#b8860b", "#7d3c98", "#16a0a0",
+];
 
 /// Panels below each other, whose lines share both axes: across those steps, and up from zero. A line is broken
 /// where steps have no values.

@@ -3,26 +3,30 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::UNIX_EPOCH;
+use std::time::{Duration, UNIX_EPOCH};
 
 /// A file as it was.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Stamp {
     file: PathBuf,
     bytes: u64,
-    /// Nanoseconds after 1970 at which it was last written.
-    modified_ns: u64,
+    /// Nanoseconds after 1970 at which it was last written; below zero before.
+    modified_ns: i64,
 }
 
 impl Stamp {
     /// `None` of what is no file, as the name of a derived path.
     fn of(file: &Path, name: PathBuf) -> Option<Self> {
         let found = std::fs::metadata(file).ok().filter(|m| m.is_file())?;
-        let modified = found.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
+        let nanos = |span: Duration| i64::try_from(span.as_nanos()).unwrap_or(i64::MAX);
+        let modified_ns = match found.modified().ok()?.duration_since(UNIX_EPOCH) {
+            Ok(after) => nanos(after),
+            Err(before) => -nanos(before.duration()),
+        };
         Some(Self {
             file: name,
             bytes: found.len(),
-            modified_ns: u64::try_from(modified.as_nanos()).ok()?,
+            modified_ns,
         })
     }
 }
@@ -80,8 +84,32 @@ mod tests {
     use super::*;
 
     #[test]
+    fn files_of_before_1970_are_files() {
+        let here = tempfile::tempdir().unwrap();
+        let path = here.path().join("old.png");
+        let stamped = |text: &str, seconds: u64| {
+            std::fs::write(&path, text).unwrap();
+            let file = std::fs::File::options().append(true).open(&path).unwrap();
+            let time = UNIX_EPOCH - Duration::from_secs(seconds);
+            file.set_modified(time).unwrap();
+            stamps(std::slice::from_ref(&path), |_| PathBuf::from("old.png"))
+        };
+        let before = stamped("one", 100);
+        assert_eq!(before[0].modified_ns, -100_000_000_000);
+        assert_eq!(changes(&before, &stamped("one", 100)), "");
+        assert_eq!(
+            changes(&before, &stamped("one", 99)),
+            "old.png was written since"
+        );
+        assert_eq!(
+            changes(&before, &stamped("other", 100)),
+            "old.png has 5 bytes, not 3"
+        );
+    }
+
+    #[test]
     fn what_became_of_files_is_said() {
-        let stamp = |name: &str, bytes: u64, modified_ns: u64| Stamp {
+        let stamp = |name: &str, bytes: u64, modified_ns: i64| Stamp {
             file: PathBuf::from(name),
             bytes,
             modified_ns,

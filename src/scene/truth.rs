@@ -8,7 +8,7 @@ use render::coverage::{MatteCoverage, coverage_matte, coverage_points, mean_matt
 use render::score::{
     MaskedScore, PSNR_CAP_DB, Score, ScoreError, mean, mean_masked, mean_of, score, score_masked,
 };
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::collections::BTreeSet;
 
 /// A photo to compare a rendered picture with.
@@ -29,19 +29,56 @@ pub struct Truth {
 }
 
 /// What a picture scores against a photo.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+///
+/// As JSON, its entries beside each other; PSNR and SSIM of nothing ([`Self::is_of_nothing`]) are `null`.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TruthScore {
     /// Over the whole picture.
-    #[serde(flatten)]
     pub score: Score,
     /// The share of [`Truth::points`] that fall on covered pixels; `None` where there are none.
     pub coverage_points: Option<f64>,
     /// Inside the photo's own mask or matte, if it has one.
-    #[serde(flatten)]
     pub masked: Option<MaskedScore>,
     /// Of its matte and of its background, if it has a matte.
-    #[serde(flatten)]
     pub matte: Option<MatteCoverage>,
+}
+
+impl Serialize for TruthScore {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Entries {
+            psnr: Option<f64>,
+            psnr_exposed: Option<f64>,
+            ssim: Option<f64>,
+            psnr_covered: Option<f64>,
+            coverage: f64,
+            coverage_points: Option<f64>,
+            #[serde(flatten)]
+            masked: Option<MaskedScore>,
+            #[serde(flatten)]
+            matte: Option<MatteCoverage>,
+        }
+        let told = |value: f64| (!self.is_of_nothing()).then_some(value);
+        let capped = |psnr: f64| psnr.min(PSNR_CAP_DB);
+        let Score {
+            psnr,
+            psnr_exposed,
+            ssim,
+            psnr_covered,
+            coverage,
+        } = self.score;
+        let entries = Entries {
+            psnr: told(psnr).map(capped),
+            psnr_exposed: told(psnr_exposed).map(capped),
+            ssim: told(ssim),
+            psnr_covered: psnr_covered.map(capped),
+            coverage,
+            coverage_points: self.coverage_points,
+            masked: self.masked,
+            matte: self.matte,
+        };
+        entries.serialize(serializer)
+    }
 }
 
 impl Truth {
@@ -279,6 +316,10 @@ mod tests {
         let nothing = RgbaImage::new(16, 16);
         let score = |alpha: u8| of(alpha).score(&nothing).unwrap();
         assert!(score(0).is_of_nothing() && !score(255).is_of_nothing());
+        let json = |score: TruthScore| serde_json::to_value(score).unwrap();
+        for key in ["psnr", "psnr_exposed", "ssim"] {
+            assert!(json(score(0))[key].is_null() && json(score(255))[key].is_f64());
+        }
         let mean = TruthScore::mean(&[score(0), score(255)]).unwrap();
         assert_eq!(mean.score, score(255).score);
         let mean = TruthScore::mean(&[score(0)]).unwrap();

@@ -97,11 +97,14 @@ fn an_object_and_its_background_are_covered_each_by_itself() {
         .stdout;
     let heads: Vec<&str> = table.lines().next().unwrap().split_whitespace().collect();
     assert_eq!(heads[5..7], ["coverage", "coverage_points"]);
-    assert_eq!(heads[9..11], ["coverage_matte", "coverage_background"]);
+    assert_eq!(
+        heads[9..12],
+        ["coverage_masked", "coverage_matte", "coverage_background"]
+    );
     let cells = table.lines().map(|line| line.split_whitespace().count());
     let cells: Vec<usize> = cells.collect();
     // "cpu ms" is two words.
-    assert_eq!(cells, [14, 13, 13, 13, 13]);
+    assert_eq!(cells, [15, 14, 14, 14, 14]);
 }
 
 #[test]

@@ -1,6 +1,20 @@
 //! Usage: exit code 2, and what to do. What is said of options and paths that do not do what was meant.
 
-use crate::run::{lumigraph, with_wall};
+use crate::run::{lumigraph, run, with_wall};
+
+#[test]
+fn threads_of_a_variable_are_as_many_as_of_the_option() {
+    let folder = with_wall();
+    for (count, code) in [("100000", 2), ("3", 0), ("0", 0), ("many", 0)] {
+        let variables = [("RAYON_NUM_THREADS", count)];
+        let ran = run(folder.path(), &["info", "wall"], &variables);
+        assert_eq!(ran.code, code, "{count}: {}", ran.stderr);
+        let is_told = ran
+            .stderr
+            .contains("RAYON_NUM_THREADS=100000: expected a whole number in 1..=");
+        assert_eq!(is_told, code == 2, "{}", ran.stderr);
+    }
+}
 
 #[test]
 fn usage_errors_exit_with_2() {

@@ -1,6 +1,7 @@
 //! Of the photos of a lumigraph.
 
 use super::*;
+use std::sync::mpsc::channel;
 
 #[test]
 fn a_mask_that_cannot_be_decoded_ignores_all_and_tells() {
@@ -104,6 +105,36 @@ fn what_drawings_ask_for_in_vain_is_told_once_in_order() {
     store.find_missed(&[4, 2, 3]);
     assert_eq!(store.take_missed(), [error(3), error(4)]);
     assert!(store.take_missed().is_empty());
+}
+
+#[test]
+fn what_is_decoded_ahead_stays_where_a_frame_begins_meanwhile() {
+    let four = photo_bytes([4, 4], 0);
+    // Room for both, and for one alone.
+    for (budget, loads) in [(2 * four, 1), (four, 2)] {
+        let (begun, begins) = channel();
+        let (goes_on, going_on) = channel();
+        let gates = Mutex::new((begun, going_on));
+        let mut store = PhotoStore::new(2, move |i| {
+            if i == 1 {
+                let (begun, going_on) = &*lock(&gates);
+                begun.send(()).unwrap();
+                going_on.recv().unwrap();
+            }
+            Ok(RgbaImage::new(4, 4))
+        });
+        store.set_budget(Some(budget));
+        std::thread::scope(|scope| {
+            scope.spawn(|| store.decode_ahead(1, [4, 4], &[false; 2]));
+            begins.recv().unwrap();
+            store.make_room(&[0], [[4, 4]].into_iter(), 0, false);
+            store.get_from_level(0, 0).unwrap();
+            goes_on.send(()).unwrap();
+        });
+        goes_on.send(()).unwrap();
+        store.get(1).unwrap();
+        assert_eq!(store.residency().loads, 1 + loads, "{budget}");
+    }
 }
 
 #[test]

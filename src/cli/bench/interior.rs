@@ -170,8 +170,9 @@ pub(super) fn measure(
             if i == 0 && setting.fill == PortalFill::Ldi && pictures.is_none() {
                 pictures = Some(Pictures {
                     truth: truth.clone(),
-                    default: picture,
-                    exact: truth.clone(),
+                    setting: setting.name(),
+                    drawn: picture,
+                    exact: None,
                 });
             }
         }
@@ -237,8 +238,9 @@ pub(super) fn measure(
     let none = RgbaImage::from_pixel(1, 1, Rgba([0; 4]));
     let pictures = pictures.unwrap_or_else(|| Pictures {
         truth: none.clone(),
-        default: none.clone(),
-        exact: none,
+        setting: settings[0].name(),
+        drawn: none,
+        exact: None,
     });
     Ok((result, pictures))
 }

@@ -239,8 +239,9 @@ fn scores(
             if i == 0 && setting.is_default() {
                 pictures = Some(Pictures {
                     truth: truth.picture().clone(),
-                    default: picture,
-                    exact,
+                    setting: setting.name(),
+                    drawn: picture,
+                    exact: Some(exact),
                 });
             }
         }

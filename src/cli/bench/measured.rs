@@ -28,9 +28,9 @@ pub(super) struct Measured {
     pub(super) frame: Times,
     /// The least and the greatest repeat's CPU time, in milliseconds.
     pub(super) cpu_ms_range: [f64; 2],
-    /// The first view's from photos on disk.
+    /// The first view's from photos on disk; of interiors with making its images, of photos that were decoded before.
     pub(super) first: Times,
-    /// What the photos decoded, or images made, for that first view took, and their number.
+    /// What the photos decoded, or of interiors images made, for that first view took, and their number.
     pub(super) image_bytes: u64,
     pub(super) images_made: usize,
     /// Against the photos held out, or the truth: means over the views.
@@ -135,6 +135,9 @@ impl Subject {
 /// Pictures of a view for the report.
 pub(super) struct Pictures {
     pub(super) truth: RgbaImage,
-    pub(super) default: RgbaImage,
-    pub(super) exact: RgbaImage,
+    /// By which setting, and what it drew.
+    pub(super) setting: String,
+    pub(super) drawn: RgbaImage,
+    /// The exact one, where that is not the truth.
+    pub(super) exact: Option<RgbaImage>,
 }

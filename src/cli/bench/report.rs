@@ -8,7 +8,7 @@ use anyhow::Context;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use image::codecs::jpeg::JpegEncoder;
-use image::{Rgb, RgbImage};
+use image::{Rgb, RgbImage, RgbaImage};
 use render::score::on_black;
 use std::fmt::Write;
 
@@ -21,37 +21,36 @@ const THUMBNAIL: u32 = 360;
 /// The pictures of a subject, as they stand in the page: title and data address.
 pub(super) type Thumbnails = Vec<(String, String)>;
 
-/// Truth, default and exact with their differences.
+/// The truth, and what a setting drew, with its differences from that and from the exact picture.
 pub(super) fn thumbnails(pictures: &Pictures) -> anyhow::Result<Thumbnails> {
-    let Pictures {
-        truth,
-        default,
-        exact,
-    } = pictures;
-    let [truth, default, exact] = [truth, default, exact].map(|picture| {
+    let opaque = |picture: &RgbaImage| {
         let pixels = on_black(picture).into_iter().flatten().collect();
         let (width, height) = picture.dimensions();
         RgbImage::from_raw(width, height, pixels).expect("three bytes a pixel")
-    });
+    };
+    let (truth, drawn) = (opaque(&pictures.truth), opaque(&pictures.drawn));
     let difference = |other: &RgbImage, times: i32| {
-        RgbImage::from_fn(default.width(), default.height(), |x, y| {
-            let (a, b) = (default.get_pixel(x, y).0, other.get_pixel(x, y).0);
+        RgbImage::from_fn(drawn.width(), drawn.height(), |x, y| {
+            let (a, b) = (drawn.get_pixel(x, y).0, other.get_pixel(x, y).0);
             let apart = |c: usize| times * (i32::from(a[c]) - i32::from(b[c])).abs();
             Rgb([0, 1, 2].map(|c| apart(c).min(255) as u8))
         })
     };
-    let shown = [
+    let setting = &pictures.setting;
+    let mut shown = vec![
         ("truth".to_owned(), truth.clone()),
-        ("default".to_owned(), default.clone()),
+        (setting.clone(), drawn.clone()),
         (
-            format!("default − truth, × {FROM_TRUTH}"),
+            format!("{setting} − truth, × {FROM_TRUTH}"),
             difference(&truth, FROM_TRUTH),
         ),
-        (
-            format!("default − exact, × {FROM_EXACT}"),
-            difference(&exact, FROM_EXACT),
-        ),
     ];
+    if let Some(exact) = &pictures.exact {
+        shown.push((
+            format!("{setting} − exact, × {FROM_EXACT}"),
+            difference(&opaque(exact), FROM_EXACT),
+        ));
+    }
     let address = |(title, picture): (String, RgbImage)| Ok((title, data_address(&picture)?));
     shown.into_iter().map(address).collect()
 }
@@ -88,8 +87,8 @@ pub(super) fn page(
          <title>lumigraph: run time against error</title>\
          <link rel=\"icon\" href=\"data:,\"><style>{STYLE}</style></head><body>\n\
          <h1>Run time against error</h1><p>{}</p>\n\
-         <p>Each dot is the default with one setting changed. Time is the processor's over all \
-         threads, for one picture whose photos are decoded: the median of repeats in which all \
+         <p>Each dot is the default with one setting changed (of interiors those of LDIs and warps with these \
+         in the portals). Time is the processor's over all threads, for one picture whose photos are decoded: the median of repeats in which all \
          settings took turns. The dashed line joins what nothing beats in both (the Pareto \
          front); the ring marks the default.</p>\n",
         escape(machine)

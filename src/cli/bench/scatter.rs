@@ -21,9 +21,10 @@ pub(super) struct Axis<'a> {
 const SIZE: (f64, f64) = (760.0, 420.0);
 /// Left, top, right and bottom of the axes.
 const ROOM: (f64, f64, f64, f64) = (64.0, 26.0, 24.0, 64.0);
-const COLORS: [&str; 10] = [
+/// One for each kind of setting at least.
+pub(super) const COLORS: [&str; 12] = [
     "#2c6fbb", "#c0392b", "#2e8b57", "#b8860b", "#7d3c98", "#16a085", "#d35400", "#7f8c8d",
-    "#d81b60", "#455a64",
+    "#d81b60", "#455a64", "#8d6e63", "#9e9d24",
 ];
 
 /// Values to places along an axis.
@@ -66,17 +67,25 @@ impl Scale {
 
     /// Round values along it.
     fn ticks(&self) -> Vec<f64> {
-        if !self.is_log {
-            let step = plot::step(self.high - self.low);
-            let first = (self.low / step).ceil() as i64;
-            let last = (self.high / step).floor() as i64;
-            return (first..=last).map(|i| i as f64 * step).collect();
-        }
+        // On a logarithmic axis one number gives no scale: the coarsest steps that give three, if there are any.
+        const STEPS: [&[f64]; 3] = [
+            &[1.0],
+            &[1.0, 2.0, 5.0],
+            &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0],
+        ];
         let decades = self.low.log10().floor() as i32..=self.high.log10().ceil() as i32;
-        let wide = self.high / self.low > 100.0;
-        let steps: &[f64] = if wide { &[1.0] } else { &[1.0, 2.0, 5.0] };
-        let all = decades.flat_map(|d| steps.iter().map(move |s| s * 10.0_f64.powi(d)));
-        all.filter(|v| (self.low..=self.high).contains(v)).collect()
+        for steps in STEPS.into_iter().filter(|_| self.is_log) {
+            let all = decades.clone();
+            let all = all.flat_map(|d| steps.iter().map(move |s| s * 10.0_f64.powi(d)));
+            let within: Vec<f64> = all.filter(|v| (self.low..=self.high).contains(v)).collect();
+            if within.len() >= 3 {
+                return within;
+            }
+        }
+        let step = plot::step(self.high - self.low);
+        let first = (self.low / step).ceil() as i64;
+        let last = (self.high / step).floor() as i64;
+        (first..=last).map(|i| i as f64 * step).collect()
     }
 }
 
@@ -304,6 +313,23 @@ mod tests {
         assert_eq!(grid(&dots, &even), (expected.clone(), true));
         // What is not shown is not named either.
         assert_eq!(grid(&dots, &log), (expected, false));
+    }
+
+    #[test]
+    fn axes_have_two_numbers_at_least() {
+        for low in [0.013, 0.24, 1.0, 2.4, 17.0, 24.0, 55.0, 99.0, 1234.5] {
+            for ratio in [1.0, 1.1, 1.8, 2.5, 7.0, 60.0, 900.0, 1e5] {
+                for is_log in [false, true] {
+                    let scale = Scale::new([low, ratio * low].into_iter(), is_log, 0.0, 100.0);
+                    let ticks = scale.ticks();
+                    let count = ticks.len();
+                    assert!(
+                        (2..=12).contains(&count),
+                        "{low} {ratio} {is_log}: {ticks:?}"
+                    );
+                }
+            }
+        }
     }
 
     #[test]

@@ -124,6 +124,7 @@ pub(super) fn settings(thorough: bool, kinds: &[Kind]) -> Vec<Setting> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::scatter::COLORS;
     use super::*;
     use std::collections::BTreeSet;
 
@@ -133,6 +134,8 @@ mod tests {
             let all = settings(thorough, &[Kind::Plane, Kind::Dense]);
             let names: BTreeSet<String> = all.iter().map(Setting::name).collect();
             assert_eq!(names.len(), all.len());
+            let knobs: BTreeSet<&str> = all.iter().map(|setting| setting.knob).collect();
+            assert!(knobs.len() <= COLORS.len());
             assert!(all[0].is_default() && !all[1..].iter().any(Setting::is_default));
             for setting in &all[1..] {
                 let mut same = setting.clone();
