@@ -4,7 +4,7 @@ use crate::common;
 
 use calibrate::{DepthAlong, Distortion, Lens, Pixel, Rigid3, View};
 use capture::DepthMap;
-use glam::{DVec2, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use proptest::prelude::*;
 use proxy::Mesh;
 use proxy::depth::{DepthError, DepthNoise, Fusion, Options, believed, fuse};
@@ -446,6 +446,27 @@ fn far_from_the_origin_and_at_any_scale_it_is_the_same() {
         let worst = errors.fold(0.0, f64::max);
         assert!(worst < 0.5 * near.voxel_size, "{worst}");
     }
+}
+
+#[test]
+fn however_the_world_is_turned_it_is_the_same() {
+    let frames = square_before_wall(|_| {});
+    let fusion = fused(&frames, &Options::default()).unwrap();
+    let turn = DQuat::from_rotation_y(0.7) * DQuat::from_rotation_x(1.1);
+    let world_from_turned = Rigid3::new(turn, DVec3::new(3.0, -40.0, 5.0));
+    let turned: Vec<_> = frames
+        .into_iter()
+        .map(|(mut view, depth)| {
+            view.camera_from_world = view.camera_from_world * world_from_turned;
+            (view, depth)
+        })
+        .collect();
+    let again = fused(&turned, &Options::default()).unwrap();
+    assert_eq!(again.mesh.triangles, fusion.mesh.triangles);
+    let pairs = again.mesh.positions.iter().zip(&fusion.mesh.positions);
+    let worst = pairs.map(|(p, q)| (world_from_turned * *p).distance(*q));
+    let worst = worst.fold(0.0, f64::max);
+    assert!(worst < 1e-5 * fusion.voxel_size, "{worst}");
 }
 
 #[test]

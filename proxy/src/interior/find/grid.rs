@@ -8,8 +8,9 @@ use rayon::prelude::*;
 
 /// Squares of the floor grid.
 const MOST_COLUMNS: f64 = 4e6;
-/// Squares around what is there, for what grows out of rooms.
-const MARGIN: f64 = 12.0;
+/// Squares around what is there, for what grows out of rooms. No whole number: walls that lie at a model's outermost corners, or whole
+/// squares from there, lie amid squares then, and rounding does not decide on which side.
+const MARGIN: f64 = 12.37;
 /// Of what lies around all that stands at eye height so much is within the grid, in widest passages:
 /// nowhere is it as narrow as one, which would part it.
 const AROUND: f64 = 2.0;
