@@ -149,11 +149,10 @@ impl Scene {
             let left = made.path().join(LEFT);
             std::fs::write(&left, text).map_err(|e| io(&left, "write", e))?;
         }
-        replace(&path, &file, made, &new).map_err(|e| io(&path, "replace the proxy", e))?;
+        let before = before.map(|before| folder.join(before));
+        let replaced = replace(&path, &file, before.as_deref(), made, &new);
+        replaced.map_err(|e| io(&path, "replace the proxy", e))?;
         self.proxy = Some(own);
-        if let Some(before) = before {
-            let _ = std::fs::remove_file(folder.join(before));
-        }
         Ok(path)
     }
 }
@@ -185,12 +184,19 @@ pub(super) fn remove_left(folder: &Path) {
     }
 }
 
-/// Has a new proxy and a new `scene.json`, which lie in `new`, take the places of others, or neither.
+/// Has a new proxy and a new `scene.json`, which lie in `new`, take the places of others, or neither; and removes the proxy of
+/// before where that has another name.
 ///
 /// There is a `scene.json` at every moment, which [`capture::folder::exchange`] takes away for one. Where there is no proxy of
 /// that name the new one comes first, and the scene always has the one that it names. Else the old one is the first to leave
 /// and the new one the last to come: killed meanwhile, the scene lacks it, but never says of one what holds of another.
-fn replace(proxy: &Path, scene: &Path, made: TempDir, new: &Path) -> std::io::Result<()> {
+fn replace(
+    proxy: &Path,
+    scene: &Path,
+    before: Option<&Path>,
+    made: TempDir,
+    new: &Path,
+) -> std::io::Result<()> {
     if proxy.is_dir() {
         let text = "a folder is in its place: move it away";
         return Err(std::io::Error::other(text));
@@ -199,10 +205,15 @@ fn replace(proxy: &Path, scene: &Path, made: TempDir, new: &Path) -> std::io::Re
     let in_new = |path: &Path| new.join(path.file_name().unwrap_or_default());
     if proxy.symlink_metadata().is_err() {
         std::fs::rename(in_new(proxy), proxy)?;
-        return std::fs::rename(in_new(scene), scene).inspect_err(|_| {
+        std::fs::rename(in_new(scene), scene).inspect_err(|_| {
             // The first error is the one to tell.
             let _ = std::fs::remove_file(proxy);
-        });
+        })?;
+        // While `made` says that it is in nobody's way.
+        if let Some(before) = before {
+            let _ = std::fs::remove_file(before);
+        }
+        return Ok(());
     }
     std::fs::copy(scene, &old_scene)?;
     std::fs::rename(proxy, &old_proxy)?;
