@@ -10,6 +10,7 @@
 
 mod believed;
 mod blocks;
+mod border;
 mod frame;
 mod nets;
 mod volume;
@@ -284,6 +285,7 @@ pub fn fuse<E: Into<Box<dyn std::error::Error + Send + Sync>>>(
     };
     drop(volume);
     fusion.mesh.drop_small_pieces(options.min_piece);
+    border::smooth(&mut fusion.mesh, voxel_size);
     fusion.triangles_before = fusion.mesh.triangles.len();
     if fusion.mesh.triangles.is_empty() {
         return Err(DepthError::NoSurface(voxel_size));
