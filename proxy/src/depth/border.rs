@@ -50,6 +50,12 @@ pub(super) fn smooth(mesh: &mut Mesh, voxel_size: f64) {
         let off = (mesh.positions[place] - before[place]).clamp_length_max(most);
         mesh.positions[place] = before[place] + off;
     }
+    let mut is_moved = vec![false; before.len()];
+    for [i, ..] in &corners {
+        is_moved[*i as usize] = true;
+    }
+    let of_border = |t: &&[u32; 3]| t.iter().any(|i| is_moved[*i as usize]);
+    let along: Vec<[u32; 3]> = mesh.triangles.iter().filter(of_border).copied().collect();
     for _ in 0..ROUNDS {
         let is_over = |t: &&[u32; 3]| {
             let normal = |positions: &[DVec3]| {
@@ -59,7 +65,7 @@ pub(super) fn smooth(mesh: &mut Mesh, voxel_size: f64) {
             let (is, was) = (normal(&mesh.positions), normal(&before));
             is != was && is.dot(was) < 0.1 * was.length_squared()
         };
-        let over: Vec<[u32; 3]> = mesh.triangles.par_iter().filter(is_over).copied().collect();
+        let over: Vec<[u32; 3]> = along.par_iter().filter(is_over).copied().collect();
         if over.is_empty() {
             return;
         }
