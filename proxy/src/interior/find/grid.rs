@@ -8,9 +8,8 @@ use rayon::prelude::*;
 
 /// Squares of the floor grid.
 const MOST_COLUMNS: f64 = 4e6;
-/// Squares around what is there, for what grows out of rooms. No whole number: walls that lie at a model's outermost corners, or whole
-/// squares from there, lie amid squares then, and rounding does not decide on which side.
-const MARGIN: f64 = 12.37;
+/// Squares around what is there, for what grows out of rooms.
+const MARGIN: f64 = 12.0;
 /// Of what lies around all that stands at eye height so much is within the grid, in widest passages:
 /// nowhere is it as narrow as one, which would part it.
 const AROUND: f64 = 2.0;
@@ -190,12 +189,12 @@ mod tests {
         // At 1.3 m the wall is still 8 · (1 − 1.3 / 2.5) = 3.84 m long.
         let found = grid(&[WALL, ground(400.0)]).unwrap();
         assert_eq!(found.step, 0.05);
-        let most = [3.84_f64, 2.88].map(|e| ((e + 8.8) / 0.05 + 2.0 * MARGIN).ceil() as usize);
+        let most = [3.84_f64, 2.88].map(|e| ((e + 8.8) / 0.05 + 24.0).ceil() as usize);
         assert!(found.size[0].abs_diff(most[0]) <= 1 && found.size[1].abs_diff(most[1]) <= 1);
-        assert!((found.origin - DVec2::splat(-4.4 - 0.05 * MARGIN)).length() < 1e-9);
+        assert!((found.origin - DVec2::splat(-4.4 - 0.6)).length() < 1e-9);
         // No farther than there is anything.
         let found = grid(&[WALL, ground(1.0)]).unwrap();
-        assert!((found.origin - DVec2::splat(-1.0 - 0.05 * MARGIN)).length() < 1e-9);
+        assert!((found.origin - DVec2::splat(-1.0 - 0.6)).length() < 1e-9);
         let none = FindError::NoRooms(1.5, 1.0);
         assert_eq!(grid(&[ground(400.0)]), Err(none));
     }
