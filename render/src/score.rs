@@ -7,26 +7,52 @@ use serde::{Serialize, Serializer};
 /// What a rendered picture scores against a photo.
 ///
 /// As JSON, a PSNR above [`PSNR_CAP_DB`] (infinite for identical pictures, which JSON cannot
-/// say) is written as that cap.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+/// say) is written as that cap; PSNR and SSIM of nothing ([`Self::is_of_nothing`]) are `null`.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Score {
     /// Peak signal-to-noise ratio in dB over the whole picture; infinite where it is
     /// identical.
-    #[serde(serialize_with = "capped")]
     pub psnr: f64,
     /// PSNR in dB over the whole picture when it is first given the photo's exposure: red,
     /// green and blue are each multiplied by the factor that fits the covered pixels best, by least squares, and
     /// then clipped at white, but not rounded again.
-    #[serde(serialize_with = "capped")]
     pub psnr_exposed: f64,
     /// Structural similarity over the whole picture; 1 where it is identical.
     pub ssim: f64,
     /// PSNR in dB over the covered pixels, those with half coverage or more; `None` where
     /// there are none.
-    #[serde(serialize_with = "capped_option")]
     pub psnr_covered: Option<f64>,
     /// The mean alpha of the rendered picture, 0…1.
     pub coverage: f64,
+}
+
+impl Score {
+    /// Whether the picture shows nothing, nor does the photo: that they are equal says nothing of how good either is.
+    pub fn is_of_nothing(&self) -> bool {
+        self.coverage == 0.0 && self.psnr >= PSNR_CAP_DB
+    }
+}
+
+impl Serialize for Score {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Entries {
+            psnr: Option<f64>,
+            psnr_exposed: Option<f64>,
+            ssim: Option<f64>,
+            psnr_covered: Option<f64>,
+            coverage: f64,
+        }
+        let told = |value: f64| (!self.is_of_nothing()).then_some(value);
+        let entries = Entries {
+            psnr: told(self.psnr.min(PSNR_CAP_DB)),
+            psnr_exposed: told(self.psnr_exposed.min(PSNR_CAP_DB)),
+            ssim: told(self.ssim),
+            psnr_covered: self.psnr_covered.map(|psnr| psnr.min(PSNR_CAP_DB)),
+            coverage: self.coverage,
+        };
+        entries.serialize(serializer)
+    }
 }
 
 /// What a rendered picture scores against a photo where a mask says that it matters: the
@@ -271,10 +297,6 @@ fn best_gain(pairs: impl Iterator<Item = (u8, u8)>) -> f64 {
 
 fn capped<S: Serializer>(psnr: &f64, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_f64(psnr.min(PSNR_CAP_DB))
-}
-
-fn capped_option<S: Serializer>(psnr: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
-    psnr.map(|p| p.min(PSNR_CAP_DB)).serialize(serializer)
 }
 
 /// The colours over black, row by row, rounded to the nearest byte.

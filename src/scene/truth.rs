@@ -6,9 +6,9 @@ use capture::CaptureError;
 use image::{GrayImage, Luma, RgbaImage};
 use render::coverage::{MatteCoverage, coverage_matte, coverage_points, mean_matte};
 use render::score::{
-    MaskedScore, PSNR_CAP_DB, Score, ScoreError, mean, mean_masked, mean_of, score, score_masked,
+    MaskedScore, Score, ScoreError, mean, mean_masked, mean_of, score, score_masked,
 };
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 use std::collections::BTreeSet;
 
 /// A photo to compare a rendered picture with.
@@ -29,56 +29,19 @@ pub struct Truth {
 }
 
 /// What a picture scores against a photo.
-///
-/// As JSON, its entries beside each other; PSNR and SSIM of nothing ([`Self::is_of_nothing`]) are `null`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TruthScore {
     /// Over the whole picture.
+    #[serde(flatten)]
     pub score: Score,
     /// The share of [`Truth::points`] that fall on covered pixels; `None` where there are none.
     pub coverage_points: Option<f64>,
     /// Inside the photo's own mask or matte, if it has one.
+    #[serde(flatten)]
     pub masked: Option<MaskedScore>,
     /// Of its matte and of its background, if it has a matte.
+    #[serde(flatten)]
     pub matte: Option<MatteCoverage>,
-}
-
-impl Serialize for TruthScore {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        #[derive(Serialize)]
-        struct Entries {
-            psnr: Option<f64>,
-            psnr_exposed: Option<f64>,
-            ssim: Option<f64>,
-            psnr_covered: Option<f64>,
-            coverage: f64,
-            coverage_points: Option<f64>,
-            #[serde(flatten)]
-            masked: Option<MaskedScore>,
-            #[serde(flatten)]
-            matte: Option<MatteCoverage>,
-        }
-        let told = |value: f64| (!self.is_of_nothing()).then_some(value);
-        let capped = |psnr: f64| psnr.min(PSNR_CAP_DB);
-        let Score {
-            psnr,
-            psnr_exposed,
-            ssim,
-            psnr_covered,
-            coverage,
-        } = self.score;
-        let entries = Entries {
-            psnr: told(psnr).map(capped),
-            psnr_exposed: told(psnr_exposed).map(capped),
-            ssim: told(ssim),
-            psnr_covered: psnr_covered.map(capped),
-            coverage,
-            coverage_points: self.coverage_points,
-            masked: self.masked,
-            matte: self.matte,
-        };
-        entries.serialize(serializer)
-    }
 }
 
 impl Truth {
@@ -157,7 +120,7 @@ impl Truth {
 impl TruthScore {
     /// Whether the picture shows nothing, nor does the photo: that they are equal says nothing of how good either is.
     pub fn is_of_nothing(&self) -> bool {
-        self.score.coverage == 0.0 && self.score.psnr >= PSNR_CAP_DB
+        self.score.is_of_nothing()
     }
 
     /// The mean, each figure over the photos that have it; those of nothing count for their coverage alone, unless
@@ -236,6 +199,7 @@ impl Scene {
 mod tests {
     use super::*;
     use image::Rgba;
+    use render::score::PSNR_CAP_DB;
 
     #[test]
     fn a_truth_reduced_keeps_its_parts_in_place() {

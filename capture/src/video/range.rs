@@ -1,9 +1,9 @@
 //! Videos whose colours are of a high dynamic range (HLG, PQ), brought to that of photos.
 //!
 //! ffmpeg applies a table of colours that is made here, so that any ffmpeg will do. A stored colour becomes the light that a
-//! screen of 1,000 cd/m² shows of it (ITU-R BT.2100-2, tables 4 and 5). White of paper, 203 cd/m² (ITU-R BT.2408), is white
-//! of photos; up to four fifths of that light stays as it is, and what is brighter, up to the screen's white, comes into
-//! the last fifth. Colours keep their ratios, until the primaries of sRGB cannot show them.
+//! screen of 1,000 cd/m² shows of it (ITU-R BT.2100-2, tables 4 and 5). Of the light of white paper, 203 cd/m² (ITU-R BT.2408),
+//! four fifths stay as they are, and what is brighter, up to the screen's white, comes into what photos have left, so that
+//! paper is nearly white (244 of 255). Colours keep their ratios, until the primaries of sRGB cannot show them.
 
 use glam::{DMat3, DVec3};
 use std::fmt::Write as _;
