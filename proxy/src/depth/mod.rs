@@ -10,6 +10,7 @@
 
 mod believed;
 mod blocks;
+mod border;
 mod frame;
 mod nets;
 mod volume;
@@ -18,9 +19,10 @@ pub use believed::{DepthNoise, believed, noise};
 
 use crate::Mesh;
 use blocks::Grid;
-use calibrate::View;
+use calibrate::{Rigid3, View};
 use capture::DepthMap;
 use frame::{Frame, Inverse, Rays, Statistics, Trust};
+use glam::{DQuat, DVec3};
 use volume::{BLOCK_BYTES, Band, Volume};
 
 /// How depth maps are fused.
@@ -160,6 +162,12 @@ const BAND_NOISE: f64 = 4.0;
 /// Depths whose pixels are wider than so many voxels belong to no surface.
 const MAX_PIXEL_PER_VOXEL: f64 = 4.0;
 
+/// How voxels lie in the first camera's frame: askew, as walls and floors that lie along them come out worse, and cameras mostly
+/// look along them. In the world's axes the surface would depend on how the world is turned.
+fn turn() -> DQuat {
+    DQuat::from_rotation_x(0.45) * DQuat::from_rotation_y(0.6) * DQuat::from_rotation_z(0.3)
+}
+
 /// Fuses `count` depth maps, each with the view that saw it. `frame` gives the one of a
 /// number below `count`; it is asked for each several times, always in order, and one is
 /// held at a time.
@@ -179,11 +187,17 @@ pub fn fuse<E: Into<Box<dyn std::error::Error + Send + Sync>>>(
         return Err(DepthError::NoFrames);
     }
     let mut rays = Rays::default();
+    let mut grid_from_world = None;
     // What is done with each depth map; all of them, or a few spread over all.
     let mut each = |step: usize, work: &mut dyn FnMut(Inverse)| {
         for number in (0..count).step_by(step) {
-            let (view, depth) = frame(number).map_err(|e| DepthError::Frame(number, e.into()))?;
+            let (mut view, depth) =
+                frame(number).map_err(|e| DepthError::Frame(number, e.into()))?;
             check_frame(number, &view, &depth)?;
+            // The first camera's frame, turned.
+            let first = || Rigid3::new(turn(), DVec3::ZERO) * view.camera_from_world;
+            let grid_from_world = *grid_from_world.get_or_insert_with(first);
+            view.camera_from_world = view.camera_from_world * grid_from_world.inverse();
             let rays = rays.of(&view.lens, depth.width, depth.height);
             work(Inverse::new(view, &depth, rays));
         }
@@ -254,8 +268,14 @@ pub fn fuse<E: Into<Box<dyn std::error::Error + Send + Sync>>>(
         volume.integrate(&Frame::new(&map, &trust));
     })?;
     // 4. The surface.
+    let mut mesh = nets::surface(&volume);
+    let world_from_grid = grid_from_world.map(|motion| motion.inverse());
+    let world_from_grid = world_from_grid.unwrap_or(Rigid3::IDENTITY);
+    for p in &mut mesh.positions {
+        *p = world_from_grid * *p;
+    }
     let mut fusion = Fusion {
-        mesh: nets::surface(&volume),
+        mesh,
         voxel_size,
         band: volume.band.before,
         blocks: volume.keys.len(),
@@ -265,6 +285,7 @@ pub fn fuse<E: Into<Box<dyn std::error::Error + Send + Sync>>>(
     };
     drop(volume);
     fusion.mesh.drop_small_pieces(options.min_piece);
+    border::smooth(&mut fusion.mesh, voxel_size);
     fusion.triangles_before = fusion.mesh.triangles.len();
     if fusion.mesh.triangles.is_empty() {
         return Err(DepthError::NoSurface(voxel_size));

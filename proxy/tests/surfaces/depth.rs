@@ -4,11 +4,11 @@ use crate::common;
 
 use calibrate::{DepthAlong, Distortion, Lens, Pixel, Rigid3, View};
 use capture::DepthMap;
-use glam::{DVec2, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use proptest::prelude::*;
 use proxy::Mesh;
 use proxy::depth::{DepthError, DepthNoise, Fusion, Options, believed, fuse};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;
 
 const SIZE: (u32, u32) = (160, 120);
@@ -338,6 +338,27 @@ fn no_skin_joins_a_silhouette_to_what_is_behind() {
     assert!(on_square(&mixed) * 10 > on_square(&clean) * 8);
 }
 
+/// Voxels lie askew: as they come its sides go in steps of one.
+#[test]
+fn the_border_of_a_square_is_straight() {
+    let fusion = fused(&square_before_wall(|_| ()), &voxels(0.03)).unwrap();
+    let sides = sides(&fusion.mesh);
+    let open = sides.keys().filter(|(a, b)| !sides.contains_key(&(*b, *a)));
+    let corners: BTreeSet<u32> = open.flat_map(|(a, b)| [*a, *b]).collect();
+    let corners = corners.iter().map(|i| fusion.mesh.positions[*i as usize]);
+    let is_right = |p: &DVec3| p.z.abs() < 0.02 && p.x > 0.25 && p.y.abs() < 0.25;
+    let right: Vec<f64> = corners.filter(is_right).map(|p| p.x).collect();
+    let mean = right.iter().sum::<f64>() / right.len() as f64;
+    let squares = right.iter().map(|x| (x - mean).powi(2)).sum::<f64>();
+    let deviation = (squares / right.len() as f64).sqrt() / 0.03;
+    eprintln!(
+        "border: {} corners, {mean:.4}, deviation {deviation:.3} voxels",
+        right.len()
+    );
+    assert!(right.len() > 12 && (mean - 0.4).abs() < 0.04, "{mean}");
+    assert!(deviation < 0.2, "{deviation}");
+}
+
 #[test]
 fn noise_is_found_and_makes_voxels_coarser_and_errors_smaller() {
     let mut state = 7_u64;
@@ -446,6 +467,34 @@ fn far_from_the_origin_and_at_any_scale_it_is_the_same() {
         let worst = errors.fold(0.0, f64::max);
         assert!(worst < 0.5 * near.voxel_size, "{worst}");
     }
+}
+
+#[test]
+fn however_the_world_is_turned_it_is_the_same() {
+    let frames = square_before_wall(|_| {});
+    let fusion = fused(&frames, &Options::default()).unwrap();
+    let turn = DQuat::from_rotation_y(0.7) * DQuat::from_rotation_x(1.1);
+    let world_from_turned = Rigid3::new(turn, DVec3::new(3.0, -40.0, 5.0));
+    let turned: Vec<_> = frames
+        .into_iter()
+        .map(|(mut view, depth)| {
+            view.camera_from_world = view.camera_from_world * world_from_turned;
+            (view, depth)
+        })
+        .collect();
+    let again = fused(&turned, &Options::default()).unwrap();
+    assert_eq!(again.mesh.triangles, fusion.mesh.triangles);
+    let pairs = again.mesh.positions.iter().zip(&fusion.mesh.positions);
+    let off = pairs.map(|(p, q)| (world_from_turned * *p).distance(*q) / fusion.voxel_size);
+    let off: Vec<f64> = off.collect();
+    // Whether a corner of the border would turn a triangle over may be a matter of rounding.
+    let moved = off.iter().filter(|off| **off > 1e-5).count();
+    let worst = off.iter().copied().fold(0.0, f64::max);
+    eprintln!(
+        "turned: {moved} of {} corners, at most {worst:.3} voxels",
+        off.len()
+    );
+    assert!(1000 * moved <= off.len() && worst <= 1.0, "{moved} {worst}");
 }
 
 #[test]

@@ -13,6 +13,7 @@ mod complete;
 mod corridors;
 mod distance;
 mod grid;
+mod holes;
 mod level;
 mod merge;
 mod openings;

@@ -1,6 +1,7 @@
 //! Holes in what parts two rooms.
 
-use super::columns::{Columns, band, bin_at, height_of};
+use super::columns::{Columns, band, height_of};
+use super::holes::{LEAST, holes};
 use super::regions::Grown;
 use super::thick::{SILLS, THICKEST};
 use glam::DVec2;
@@ -93,10 +94,6 @@ const SAME_PLANE: f64 = 0.2;
 const REACH: f64 = 0.35;
 /// Openings that end within this of each other, and of a wall between the rooms beyond, end there; metres.
 const SAME_END: f64 = 0.35;
-/// Openings' least width, height and area; metres. Of squares that are free: jambs take one on each side, so that
-/// openings of 0.4 m are found wherever the grid's lines are.
-const LEAST: f64 = 0.35;
-const LEAST_AREA: f64 = 0.15;
 /// Floors are rough: an opening that begins lower begins at the floor; metres.
 const THRESHOLD: f64 = 0.3;
 const ROUGH: f64 = 0.15;
@@ -408,97 +405,4 @@ fn reaching(seen: u128, free: u128) -> u128 {
         }
         all = more;
     }
-}
-
-/// Rectangles of what hangs together: from and to along, and bins from and to.
-fn holes(open: &[u128], step: f64) -> Vec<[usize; 4]> {
-    let bins = bin_at(f64::INFINITY);
-    let mut left = open.to_vec();
-    let mut found = Vec::new();
-    for first in 0..left.len() {
-        while left[first] != 0 {
-            // 1. All that hangs together.
-            let mut piece = vec![0_u128; left.len()];
-            let mut stack = vec![(first, left[first].trailing_zeros())];
-            while let Some((s, bin)) = stack.pop() {
-                if left[s] >> bin & 1 == 0 {
-                    continue;
-                }
-                left[s] &= !(1 << bin);
-                piece[s] |= 1 << bin;
-                if s > 0 {
-                    stack.push((s - 1, bin));
-                }
-                if s + 1 < left.len() {
-                    stack.push((s + 1, bin));
-                }
-                if bin > 0 {
-                    stack.push((s, bin - 1));
-                }
-                if (bin as usize) + 1 < bins {
-                    stack.push((s, bin + 1));
-                }
-            }
-            // 2. Its rectangle: what is open by half as much as where it is most. Where a screen
-            // stands in it, its tall parts first.
-            let least = (LEAST / step).ceil() as usize;
-            loop {
-                let tall = |s: usize| piece[s].count_ones() as usize;
-                let highest = (0..piece.len()).map(tall).max().unwrap_or(0);
-                let is_tall = |s: &usize| 3 * tall(*s) >= 2 * highest && highest > 0;
-                let run = longest_run(piece.len(), is_tall);
-                let rest = (0..piece.len()).filter(|s| tall(*s) > 0).count();
-                if highest == 0 {
-                    break;
-                }
-                // Ragged ends belong to it.
-                let range = if rest < run.len() + 2 * least {
-                    0..piece.len()
-                } else {
-                    run
-                };
-                let mut part = vec![0; piece.len()];
-                part[range.clone()].copy_from_slice(&piece[range.clone()]);
-                piece[range].fill(0);
-                found.extend(rectangle(&part, step));
-            }
-        }
-    }
-    found
-}
-
-/// The longest run of numbers that are so.
-fn longest_run(count: usize, is_so: impl Fn(&usize) -> bool) -> Range<usize> {
-    let mut best = 0..0;
-    let mut start = 0;
-    for i in 0..=count {
-        if i < count && is_so(&i) {
-            continue;
-        }
-        if i - start > best.len() {
-            best = start..i;
-        }
-        start = i + 1;
-    }
-    best
-}
-
-/// About the rectangle that a piece fills, if it is large enough.
-fn rectangle(piece: &[u128], step: f64) -> Option<[usize; 4]> {
-    let tall = |s: usize| piece[s].count_ones() as usize;
-    let wide = |bin: usize| piece.iter().filter(|p| **p >> bin & 1 == 1).count();
-    let span = |count: usize, of: &dyn Fn(usize) -> usize| {
-        let most = (0..count).map(of).max().unwrap_or(0);
-        let is_much = |i: &usize| 2 * of(*i) >= most;
-        let from = (0..count).find(is_much).unwrap_or(0);
-        let to = (0..count).rev().find(is_much).unwrap_or(0) + 1;
-        (from, to)
-    };
-    let (from, to) = span(piece.len(), &tall);
-    let (sill, head) = span(bin_at(f64::INFINITY), &wide);
-    let (width, height) = ((to - from) as f64 * step, height_of(head) - height_of(sill));
-    let area = piece.iter().map(|p| p.count_ones()).sum::<u32>();
-    let area = f64::from(area) * step * (height_of(1) - height_of(0));
-    let is_large = width >= LEAST && height >= LEAST && area >= LEAST_AREA;
-    is_large.then_some([from, to, sill, head])
 }
