@@ -72,7 +72,7 @@ impl Scene {
             let mut known = own.iter().chain(stay.clone());
             if !is_left && !known.any(|part| *part == name) {
                 return Err(occupied(format!(
-                    "holds {name}, which is no part of a scene; choose another folder"
+                    "holds {name}, which is no part of a scene; choose another folder, or move that away first"
                 )));
             }
         }

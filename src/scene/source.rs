@@ -168,6 +168,9 @@ impl Candidates {
                 0
             };
             usable.insert(place, Source::Colmap(model.clone()));
+            let mut elsewhere = colmap::find_models(folder);
+            elsewhere.retain(|other| other != model);
+            usable.extend(elsewhere.into_iter().map(Source::Colmap));
         }
         let damaged = damaged.into_iter().map(SceneError::Format);
         let unusable = of_opencv.unusable.into_iter().map(SceneError::OpenCv);

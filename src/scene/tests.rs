@@ -374,6 +374,19 @@ fn of_a_data_set_s_parts_that_to_train_on_goes_first() {
     assert_eq!(scene.names(), ["val/a.png", "val/b.png"]);
 }
 
+#[test]
+fn models_of_colmap_in_other_places_are_told() {
+    let captures = Captures::new();
+    captures.photos("wall/images", &["a.png", "b.png"], SIZE);
+    captures.model("wall/sparse/0", &["a.png", "b.png"]);
+    captures.model("wall/model", &["a.png"]);
+    let (scene, said) = captures.import("wall");
+    assert_eq!(scene.names(), ["a.png", "b.png"]);
+    let note = "the calibration is the COLMAP model in ROOT/wall/sparse/0; `lumigraph import ROOT/wall --calibration \
+                ROOT/wall/model -o SCENE` takes that in ROOT/wall/model";
+    assert_eq!(said, [note]);
+}
+
 /// As nerfstudio's `ns-process-data` leaves it.
 #[test]
 fn colmap_s_work_for_another_program_is_used_where_that_left_nothing() {

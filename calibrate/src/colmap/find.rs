@@ -41,6 +41,25 @@ pub fn find_model(folder: &Path) -> Result<PathBuf, ColmapError> {
     Err(no_model(folder, &looked_in))
 }
 
+/// Of each of the places where [`find_model`] looks the largest model, in its order, each once: the first is that which it
+/// takes. Places that cannot be looked into have none.
+pub fn find_models(folder: &Path) -> Vec<PathBuf> {
+    let mut found: Vec<PathBuf> = Vec::new();
+    let mut known = Vec::new();
+    for Together { places, .. } in places(folder) {
+        let Ok(Some(model)) = largest(&places) else {
+            continue;
+        };
+        // Links may lead to one that is there already.
+        let is = fs::canonicalize(&model).unwrap_or_else(|_| model.clone());
+        if !known.contains(&is) {
+            known.push(is);
+            found.push(model);
+        }
+    }
+    found
+}
+
 /// Places of which that with the largest model is taken.
 struct Together {
     places: Vec<PathBuf>,

@@ -26,7 +26,7 @@ mod text;
 mod write;
 
 pub use error::{ColmapError, Incomplete, Place};
-pub use find::{SubModel, find_model, side_by_side};
+pub use find::{SubModel, find_model, find_models, side_by_side};
 pub use write::{fits_text, write_binary, write_text};
 
 use crate::{Camera, CameraId, Reconstruction};

@@ -1,7 +1,7 @@
 use crate::synthetic::small;
 #[cfg(unix)]
 use calibrate::colmap::{ColmapError, read_model};
-use calibrate::colmap::{find_model, side_by_side, write_binary, write_text};
+use calibrate::colmap::{find_model, find_models, side_by_side, write_binary, write_text};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::PathBuf;
@@ -10,7 +10,8 @@ use std::path::PathBuf;
 fn the_usual_places_are_tried_in_order() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
-    for place in [
+    assert_eq!(find_models(root), Vec::<PathBuf>::new());
+    let mut places = [
         "colmap/sparse",
         "colmap/sparse/0",
         "0",
@@ -20,11 +21,23 @@ fn the_usual_places_are_tried_in_order() {
         "dense/sparse",
         "sparse",
         "sparse/0",
-    ] {
+    ];
+    for place in places {
         let place = root.join(place);
         write_text(&small(), &place).unwrap();
         let found = find_model(root).unwrap();
         assert_eq!(found.components().as_path(), place.components().as_path());
+    }
+    // All of them, but one place by another name.
+    places.reverse();
+    let all = places.map(|place| root.join(place).components().as_path().to_owned());
+    assert_eq!(find_models(root), all);
+    #[cfg(unix)]
+    {
+        fs::remove_dir_all(root.join("model")).unwrap();
+        std::os::unix::fs::symlink(root.join("sparse/0"), root.join("model")).unwrap();
+        let others = all.into_iter().filter(|place| !place.ends_with("model"));
+        assert_eq!(find_models(root), others.collect::<Vec<_>>());
     }
 }
 
