@@ -56,7 +56,8 @@ pub(super) fn smooth(mesh: &mut Mesh, voxel_size: f64) {
     }
     let of_border = |t: &&[u32; 3]| t.iter().any(|i| is_moved[*i as usize]);
     let along: Vec<[u32; 3]> = mesh.triangles.iter().filter(of_border).copied().collect();
-    for _ in 0..ROUNDS {
+    // Each time more of those that moved are back: it ends.
+    loop {
         let is_over = |t: &&[u32; 3]| {
             let normal = |positions: &[DVec3]| {
                 let [a, b, c] = t.map(|i| positions[i as usize]);
