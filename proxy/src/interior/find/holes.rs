@@ -42,6 +42,7 @@ pub(super) fn holes(open: &[u128], step: f64) -> Vec<[usize; 4]> {
             // 2. Its rectangle: what is open by half as much as where it is most. Where a screen
             // stands in it, its tall parts first.
             let least = (LEAST / step).ceil() as usize;
+            let mut of_piece = Vec::new();
             loop {
                 let tall = |s: usize| piece[s].count_ones() as usize;
                 let highest = (0..piece.len()).map(tall).max().unwrap_or(0);
@@ -67,11 +68,27 @@ pub(super) fn holes(open: &[u128], step: f64) -> Vec<[usize; 4]> {
                 part[range.clone()].copy_from_slice(&piece[range.clone()]);
                 piece[range].fill(0);
                 let parts = parts_by_height(&part);
-                found.extend(parts.iter().filter_map(|p| rectangle(p, step)));
+                of_piece.extend(parts.iter().filter_map(|p| rectangle(p, step)));
             }
+            found.extend(joined(of_piece));
         }
     }
     found
+}
+
+/// Rectangles of one piece, those that go on from one to the next at the same heights as one: what is below a part of them,
+/// beyond a slit, had parted them.
+fn joined(mut rectangles: Vec<[usize; 4]>) -> Vec<[usize; 4]> {
+    rectangles.sort_unstable();
+    let mut all: Vec<[usize; 4]> = Vec::new();
+    for [from, to, sill, head] in rectangles {
+        let goes_on = |last: &&mut [usize; 4]| last[1..] == [from, sill, head];
+        match all.iter_mut().find(goes_on) {
+            Some(last) => last[1] = to,
+            None => all.push([from, to, sill, head]),
+        }
+    }
+    all
 }
 
 /// The longest run of numbers that are so.
@@ -171,6 +188,12 @@ mod tests {
         assert_eq!(holes(&open, 0.05), whole);
         open[0] = band([1.6, 2.9]);
         assert_eq!(holes(&open, 0.05), whole);
+        // Nor does a hole below the crack part it.
+        let mut holed = open.clone();
+        holed[20..40].fill(band([0.5, 1.75]) | window);
+        holed[20] = band([0.5, 2.9]);
+        let found = holes(&holed, 0.05);
+        assert!(found.contains(&whole[0]), "{found:?}");
         // One that is open halfway is of it.
         open[..30].fill(band([1.6, 2.9]));
         assert_eq!(holes(&open, 0.05)[0][2], bin_at(1.6));
