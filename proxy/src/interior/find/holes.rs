@@ -10,7 +10,7 @@ const LEAST_AREA: f64 = 0.15;
 /// Of the most that a hole is open across, heights at which it is open by this part or less do not join what is above and below.
 const SLIT: usize = 10;
 
-/// Rectangles of what hangs together: from and to along, and bins from and to.
+/// Rectangles of what hangs together by more than slits: from and to along, and bins from and to.
 pub(super) fn holes(open: &[u128], step: f64) -> Vec<[usize; 4]> {
     let bins = bin_at(f64::INFINITY);
     let mut left = open.to_vec();
