@@ -12,12 +12,13 @@
 
 mod group;
 
-use crate::cpu::lanes::vectorised;
+use crate::cpu::lanes::in_vectors;
 use crate::frame::{FrameSource, ProxyPoint};
 use crate::planted::{Fault, is_planted};
 use calibrate::{Lens, Pixel};
 use glam::DVec3;
 use group::{Bounds, Group, Query};
+use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -150,7 +151,10 @@ impl ViewTree {
     pub(crate) fn within(&self, ball: &Ball, measure: Measure, most: f64, found: &mut Vec<u32>) {
         found.clear();
         let query = Query::new(ball, measure, most);
-        self.visit(&query, |group, may| self.add(group, may, found));
+        self.visit(&query, |group, may| {
+            let views = self.views[GROUP * group..].iter().zip(may);
+            found.extend(views.filter_map(|(view, may)| (may != 0).then_some(*view)));
+        });
         self.sort(found);
     }
 
@@ -162,58 +166,20 @@ impl ViewTree {
         self.visit(&query, |group, may| {
             let views = self.views[GROUP * group..].iter();
             for (lane, (view, may)) in views.zip(may).enumerate() {
-                if may {
+                if may != 0 {
                     found.put(*view, &self.levels[0][group], lane);
                 }
             }
         });
     }
 
-    /// Goes through the groups of views of which some may matter, and a few more.
-    fn visit(&self, query: &Query, mut with: impl FnMut(usize, [bool; GROUP])) {
-        vectorised(
-            #[inline(always)]
-            || match self.levels.len() {
-                1 => {
-                    for (i, group) in self.levels[0].iter().enumerate() {
-                        with(i, group.may_matter(query));
-                    }
-                }
-                _ => self.descend(query, with),
-            },
-        );
-    }
-
-    #[inline(always)]
-    fn descend(&self, query: &Query, mut with: impl FnMut(usize, [bool; GROUP])) {
-        // Groups that are yet to be asked, by level and number; of each level at most seven beside the one
-        // that is gone into.
-        let mut open = [(0_u32, 0_u32); GROUP * LEVELS + 1];
-        let mut count = 1;
-        open[0] = (self.levels.len() as u32 - 1, 0);
-        while count > 0 {
-            count -= 1;
-            let (level, group) = (open[count].0 as usize, open[count].1 as usize);
-            let may = self.levels[level][group].may_matter(query);
-            if level == 0 {
-                with(group, may);
-                continue;
-            }
-            let first = GROUP * group;
-            // The last group may have less than eight. No branch here: which go on nobody can foretell.
-            let groups = (self.levels[level - 1].len() - first).min(GROUP);
-            for (lane, may) in may[..groups].iter().enumerate() {
-                open[count] = (level as u32 - 1, (first + lane) as u32);
-                count += usize::from(*may);
-            }
-        }
-    }
-
-    /// Adds the views of a group that may matter.
-    #[inline(always)]
-    fn add(&self, group: usize, may: [bool; GROUP], found: &mut Vec<u32>) {
-        let views = self.views[GROUP * group..].iter().zip(may);
-        found.extend(views.filter_map(|(view, may)| may.then_some(*view)));
+    /// Goes through the groups of views of which some may matter, and a few more: of which are ones.
+    fn visit(&self, query: &Query, with: impl FnMut(usize, [u32; GROUP])) {
+        in_vectors(Visit {
+            tree: self,
+            query,
+            with,
+        });
     }
 
     fn sort(&self, found: &mut Vec<u32>) {
@@ -257,19 +223,78 @@ impl Around {
     ) {
         found.clear();
         let query = Query::new(ball, measure, most);
-        vectorised(
-            #[inline(always)]
-            || {
-                for (group, views) in self.groups.iter().zip(self.views.chunks(GROUP)) {
-                    let (may, least) = group.bounded(&query);
-                    let all = views.iter().zip(least).zip(may);
-                    found.extend(
-                        all.filter_map(|((view, least), may)| may.then_some((least, *view))),
-                    );
-                }
-            },
-        );
+        in_vectors(Within {
+            around: self,
+            query: &query,
+            found: &mut *found,
+        });
         found.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+    }
+}
+
+/// What is left to ask of a hierarchy: see [`ViewTree::visit`].
+struct Visit<'a, F> {
+    tree: &'a ViewTree,
+    query: &'a Query,
+    with: F,
+}
+
+impl<F: FnMut(usize, [u32; GROUP])> WithSimd for Visit<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let levels = &self.tree.levels;
+        if levels.len() == 1 {
+            for (i, group) in levels[0].iter().enumerate() {
+                (self.with)(i, group.bounded(simd, self.query).0);
+            }
+            return;
+        }
+        // Groups that are yet to be asked, by level and number; of each level at most seven beside the one
+        // that is gone into.
+        let mut open = [(0_u32, 0_u32); GROUP * LEVELS + 1];
+        let mut count = 1;
+        open[0] = (levels.len() as u32 - 1, 0);
+        while count > 0 {
+            count -= 1;
+            let (level, group) = (open[count].0 as usize, open[count].1 as usize);
+            let (may, _) = levels[level][group].bounded(simd, self.query);
+            if level == 0 {
+                (self.with)(group, may);
+                continue;
+            }
+            let first = GROUP * group;
+            // The last group may have less than eight. No branch here: which go on nobody can foretell.
+            let groups = (levels[level - 1].len() - first).min(GROUP);
+            for (lane, may) in may[..groups].iter().enumerate() {
+                open[count] = (level as u32 - 1, (first + lane) as u32);
+                count += *may as usize;
+            }
+        }
+    }
+}
+
+/// What is left to ask of views that were found: see [`Around::within`].
+struct Within<'a> {
+    around: &'a Around,
+    query: &'a Query,
+    found: &'a mut Vec<(f32, u32)>,
+}
+
+impl WithSimd for Within<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Around { views, groups } = self.around;
+        for (group, views) in groups.iter().zip(views.chunks(GROUP)) {
+            let (may, least) = group.bounded(simd, self.query);
+            let all = views.iter().zip(least).zip(may);
+            let within =
+                all.filter_map(|((view, least), may)| (may != 0).then_some((least, *view)));
+            self.found.extend(within);
+        }
     }
 }
 

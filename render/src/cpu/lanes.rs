@@ -3,7 +3,7 @@
 //! multiply-adds, so every machine computes the same bytes.
 
 use super::scalar::Scalar;
-use pulp::Arch;
+use pulp::{Arch, WithSimd};
 use std::sync::LazyLock;
 
 /// Neighbouring pixels worked on together.
@@ -16,6 +16,13 @@ pub(crate) type Lane<T = f32> = [T; LANES];
 /// instructions that there are.
 #[inline]
 pub(crate) fn vectorised<R>(f: impl FnOnce() -> R) -> R {
+    in_vectors(f)
+}
+
+/// The same for what is written for vectors of any size: loops of few steps, which the compiler unrolls before it
+/// looks for vectors, it makes halves and single numbers of.
+#[inline]
+pub(crate) fn in_vectors<F: WithSimd>(f: F) -> F::Output {
     static ARCH: LazyLock<Arch> = LazyLock::new(Arch::new);
     ARCH.dispatch(f)
 }

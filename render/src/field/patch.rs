@@ -94,7 +94,13 @@ impl Patch {
             return false;
         };
         let Seen { x, y, inverse } = &seen;
-        // 2. Each itself is seen.
+        // 2. Mostly nothing anywhere around is nearer than any of them.
+        let all = seen.largest(map, 0..POINTS);
+        let least = inverse.iter().copied().fold(f64::INFINITY, f64::min);
+        if all * (1.0 - 0.5 * TOLERANCE) <= least {
+            return true;
+        }
+        // 3. Each itself is seen.
         let is_hidden = |i: usize| {
             let nearest = map.inverse_distance(Pixel::new(x[i], y[i]));
             visible(inverse[i], nearest) < 1.0
@@ -102,13 +108,12 @@ impl Patch {
         if (0..POINTS).any(is_hidden) {
             return false;
         }
-        // 3. Nothing may be much nearer than the nearest corner of each small triangle, wherever that
+        // 4. Nothing may be much nearer than the nearest corner of each small triangle, wherever that
         // falls in the photo. Where nothing is anywhere around, triangles need not be asked.
         let most = |corners: [usize; 3]| {
             let [a, b, c] = corners.map(|i| inverse[i]);
             a.max(b).max(c) * (1.0 + 2.0 * TOLERANCE)
         };
-        let all = seen.largest(map, 0..POINTS);
         let is_open = |corners: &[usize; 3]| {
             let most = most(*corners);
             all <= most || seen.largest(map, *corners) <= most

@@ -2,8 +2,9 @@
 
 use super::{Ball, GROUP, Measure, SLACK};
 use glam::DVec3;
+use pulp::Simd;
 use std::array::from_fn;
-use std::ops::BitAnd;
+use std::ops::{Add, Div, Mul, Sub};
 
 /// Of one view, or of all within a part of the hierarchy.
 #[derive(Clone, Copy, Debug)]
@@ -81,41 +82,6 @@ const FARTHEST: f32 = 1e15;
 
 /// A number of each.
 type Each = [f32; GROUP];
-
-/// All bits of a word, or none, for each.
-#[derive(Clone, Copy)]
-struct Mask([u32; GROUP]);
-
-#[inline(always)]
-fn mask(f: impl Fn(usize) -> bool) -> Mask {
-    let mut all = [0; GROUP];
-    for i in 0..GROUP {
-        all[i] = if f(i) { u32::MAX } else { 0 };
-    }
-    Mask(all)
-}
-
-impl BitAnd for Mask {
-    type Output = Self;
-
-    #[inline(always)]
-    fn bitand(self, other: Self) -> Self {
-        let mut both = [0; GROUP];
-        for i in 0..GROUP {
-            both[i] = self.0[i] & other.0[i];
-        }
-        Self(both)
-    }
-}
-
-#[inline(always)]
-fn each(f: impl Fn(usize) -> f32) -> Each {
-    let mut all = [0.0; GROUP];
-    for i in 0..GROUP {
-        all[i] = f(i);
-    }
-    all
-}
 
 /// The bounds of eight, side by side. In f32, of which vectors hold eight: what that rounds is allowed for
 /// when they are asked.
@@ -214,24 +180,36 @@ impl Group {
         self.far[lane] = from.far[of];
     }
 
-    /// Which of them can differ by as little as is asked for and may see something.
+    /// Which of them can differ by as little as is asked for and may see something, one for those and zero for the others;
+    /// and by how much each differs at least: by nothing where that is no number.
     #[inline(always)]
-    pub(super) fn may_matter(&self, query: &Query) -> [bool; GROUP] {
-        self.bounded(query).0
+    pub(super) fn bounded<S: Simd>(&self, simd: S, query: &Query) -> ([u32; GROUP], Each) {
+        let (mut may, mut least) = ([0; GROUP], [0.0; GROUP]);
+        let (may_parts, _) = S::as_mut_simd_u32s(&mut may);
+        let (least_parts, _) = S::as_mut_simd_f32s(&mut least);
+        let parts = may_parts.iter_mut().zip(least_parts).enumerate();
+        for (part, (may, least)) in parts {
+            let (matters, bound) = self.bounded_part(simd, part, query);
+            *may = simd.select_u32s(matters, simd.splat_u32s(1), simd.splat_u32s(0));
+            *least = bound.0;
+        }
+        (may, least)
     }
 
-    /// The same, and by how much each differs at least: by nothing where that is no number.
+    /// The same of as many as a vector holds.
     #[inline(always)]
-    pub(super) fn bounded(&self, query: &Query) -> ([bool; GROUP], [f32; GROUP]) {
-        let (here, by_here) = (query.here, query.by_here);
-        // One after the other: arrays of arrays go to memory and back.
-        let [cx, cy, cz] = query.center;
-        let x = each(|i| cx - self.center[0][i]);
-        let y = each(|i| cy - self.center[1][i]);
-        let z = each(|i| cz - self.center[2][i]);
-        let distance = each(|i| (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]).sqrt());
-        let rounding = each(|i| ROUNDING * (here + self.far[i]));
-        let own = each(|i| self.radius[i] + rounding[i]);
+    fn bounded_part<S: Simd>(&self, simd: S, part: usize, query: &Query) -> (S::m32s, Many<S>) {
+        let many = |of: &Each| Many(S::as_simd_f32s(of).0[part], simd);
+        let all = |x: f32| Many(simd.splat_f32s(x), simd);
+        let [zero, one] = [0.0, 1.0].map(all);
+        let rounding_of_one = all(ROUNDING);
+        let (here, by_here) = (all(query.here), all(query.by_here));
+        let (query_radius, footprint_ratio) = (all(query.radius), many(&self.footprint_ratio));
+        let [x, y, z] = [0, 1, 2].map(|axis| all(query.center[axis]) - many(&self.center[axis]));
+        let distance = (x * x + y * y + z * z).sqrt();
+        let far = many(&self.far);
+        let rounding = rounding_of_one * (here + far);
+        let own = many(&self.radius) + rounding;
 
         // 1. How little they can differ from the viewer: the angle at the ball's middle less what they
         // subtend. From elsewhere in the ball it differs by how much: the gradients of both the angle between viewer
@@ -239,109 +217,175 @@ impl Group {
         // product of the two. Away from the viewer the angle's is only how far the view is from the line of
         // sight, over the square of its distance: less is lost where it is known that points are about in one
         // direction, and little aside: first away to where they are, then aside.
-        let near = each(|i| distance[i] - own[i] - query.radius);
-        let [tx, ty, tz] = query.towards;
-        let p = each(|i| ty * z[i] - tz * y[i]);
-        let q = each(|i| tz * x[i] - tx * z[i]);
-        let r = each(|i| tx * y[i] - ty * x[i]);
-        let across = each(|i| (p[i] * p[i] + q[i] * q[i] + r[i] * r[i]).sqrt());
+        let near = distance - own - query_radius;
+        let [tx, ty, tz] = query.towards.map(all);
+        let p = ty * z - tz * y;
+        let q = tz * x - tx * z;
+        let r = tx * y - ty * x;
+        let across = (p * p + q * q + r * r).sqrt();
         let (vary, turn) = match query.radius > 0.0 {
             true => {
-                let by_near = each(|i| 1.0 / near[i]);
-                let vary = each(|i| self.far[i] * (query.per_far * by_near[i]) + ROUNDING);
-                let turn = each(|i| {
-                    let off = (across[i] + own[i]) * by_near[i];
-                    (off * query.along + self.far[i] * query.aside) * by_near[i] + ROUNDING
-                });
-                (
-                    vary,
-                    each(|i| if turn[i] < vary[i] { turn[i] } else { vary[i] }),
-                )
+                let by_near = one / near;
+                let vary = far * (all(query.per_far) * by_near) + rounding_of_one;
+                let off = (across + own) * by_near;
+                let turn = (off * all(query.along) + far * all(query.aside)) * by_near;
+                let turn = turn + rounding_of_one;
+                (vary, Many::either(turn.is_below(vary), turn, vary))
             }
-            false => ([ROUNDING; GROUP], [ROUNDING; GROUP]),
+            false => (rounding_of_one, rounding_of_one),
         };
-        let towards = each(|i| tx * x[i] + ty * y[i] + tz * z[i]);
-        let by_distance = each(|i| 1.0 / distance[i]);
+        let towards = tx * x + ty * y + tz * z;
+        let by_distance = one / distance;
         // At most the angle: its sine, or one where that is obtuse; where those are too little to tell,
         // a closer bound.
-        let sine = each(|i| across[i] * by_distance[i]);
+        let sine = across * by_distance;
         let angle = match query.most < SINES_TELL {
             true => {
-                let obtuse = each(|i| if towards[i] > 0.0 { 0.0 } else { 1.0 });
-                each(|i| sine[i].max(obtuse[i]))
+                let obtuse = Many::either(towards.is_above(zero), zero, one);
+                Many::either(sine.is_above(obtuse), sine, obtuse)
             }
-            false => each(|i| less_than_angle(sine[i], towards[i] * by_distance[i])),
+            false => less_than_angle(sine, towards * by_distance),
         };
-        let between = each(|i| angle[i] - more_than_asin(own[i] * by_distance[i]) - turn[i]);
+        let between = angle - more_than_asin(own * by_distance) - turn;
         let coarser = match query.by_length {
-            true => each(|i| near[i] - here - query.radius),
-            false => each(|i| {
-                let there = (distance[i] - own[i]) * by_here;
-                self.footprint_ratio[i] * there * (1.0 - vary[i] - ROUNDING) - 1.0
-            }),
+            true => near - here - query_radius,
+            false => {
+                let there = (distance - own) * by_here;
+                footprint_ratio * there * (one - vary - rounding_of_one) - one
+            }
         };
-        let least = each(|i| {
-            let sum = at_least_0(between[i]) + query.beta * at_least_0(coarser[i] - ROUNDING);
-            sum * query.counts
-        });
+        let sum = between.at_least_0() + all(query.beta) * (coarser - rounding_of_one).at_least_0();
+        let least = sum * all(query.counts);
 
         // 2. Where the ball lies: not in sight of what it is farther from the axis than they see, and it
         // subtends. The cosine and sine of what it subtends, and of the sum of both angles, all by the distance;
         // the sum is beyond π where its sine is negative.
-        let reach = each(|i| own[i] + query.sight);
-        let sharp =
-            each(|i| at_least_0((distance[i] - reach[i]) * (distance[i] + reach[i])).sqrt());
-        let [cos, sin] = &self.spread;
-        let sum_cos = each(|i| cos[i] * sharp[i] - sin[i] * reach[i]);
-        let sum_sin = each(|i| sin[i] * sharp[i] + cos[i] * reach[i]);
-        let [ax, ay, az] = &self.axis;
-        let before = each(|i| ax[i] * x[i] + ay[i] * y[i] + az[i] * z[i]);
+        let reach = own + all(query.sight);
+        let sharp = ((distance - reach) * (distance + reach))
+            .at_least_0()
+            .sqrt();
+        let [cos, sin] = [0, 1].map(|k| many(&self.spread[k]));
+        let sum_cos = cos * sharp - sin * reach;
+        let sum_sin = sin * sharp + cos * reach;
+        let [ax, ay, az] = [0, 1, 2].map(|axis| many(&self.axis[axis]));
+        let before = ax * x + ay * y + az * z;
 
-        // 3. What is no number, or not one that f32 has the square of, is kept. One comparison after the other:
-        // what is put together of several is done one by one.
-        let is_told = mask(|i| distance[i] > NEAREST) & mask(|i| distance[i] < FARTHEST);
-        let is_apart = is_told & mask(|i| near[i] > 0.0);
-        let bound = each(|i| at_least_0(if is_apart.0[i] != 0 { least[i] } else { 0.0 }));
-        let is_much = mask(|i| bound[i] > query.most);
-        let is_far = is_told
-            & mask(|i| reach[i] < distance[i])
-            & mask(|i| sum_sin[i] > 0.0)
-            & mask(|i| before[i] < sum_cos[i] - rounding[i]);
-        let mut may = [false; GROUP];
-        for i in 0..GROUP {
-            may[i] = (is_much.0[i] | is_far.0[i]) == 0;
-        }
-        (may, bound)
+        // 3. What is no number, or not one that f32 has the square of, is kept.
+        let and = |a: S::m32s, b: S::m32s| simd.and_m32s(a, b);
+        let is_told = and(
+            distance.is_above(all(NEAREST)),
+            distance.is_below(all(FARTHEST)),
+        );
+        let is_apart = and(is_told, near.is_above(zero));
+        let bound = Many::either(is_apart, least, zero).at_least_0();
+        let is_much = bound.is_above(all(query.most));
+        let is_within_half_a_turn = and(reach.is_below(distance), sum_sin.is_above(zero));
+        let is_aside = before.is_below(sum_cos - rounding);
+        let is_far = and(is_told, and(is_within_half_a_turn, is_aside));
+        (simd.not_m32s(simd.or_m32s(is_much, is_far)), bound)
     }
 }
 
-/// Zero where it is less, or no number.
-#[inline(always)]
-fn at_least_0(x: f32) -> f32 {
-    if x > 0.0 { x } else { 0.0 }
+/// Numbers of as many as a vector holds.
+#[derive(Clone, Copy)]
+struct Many<S: Simd>(S::f32s, S);
+
+impl<S: Simd> Add for Many<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(self.1.add_f32s(self.0, other.0), self.1)
+    }
+}
+
+impl<S: Simd> Sub for Many<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(self.1.sub_f32s(self.0, other.0), self.1)
+    }
+}
+
+impl<S: Simd> Mul for Many<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(self.1.mul_f32s(self.0, other.0), self.1)
+    }
+}
+
+impl<S: Simd> Div for Many<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(self.1.div_f32s(self.0, other.0), self.1)
+    }
+}
+
+impl<S: Simd> Many<S> {
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.1.sqrt_f32s(self.0), self.1)
+    }
+
+    /// Not where one is no number.
+    #[inline(always)]
+    fn is_above(self, other: Self) -> S::m32s {
+        self.1.greater_than_f32s(self.0, other.0)
+    }
+
+    /// Not where one is no number.
+    #[inline(always)]
+    fn is_below(self, other: Self) -> S::m32s {
+        self.1.less_than_f32s(self.0, other.0)
+    }
+
+    #[inline(always)]
+    fn either(holds: S::m32s, then: Self, otherwise: Self) -> Self {
+        let simd = then.1;
+        Self(simd.select_f32s(holds, then.0, otherwise.0), simd)
+    }
+
+    #[inline(always)]
+    fn of(self, x: f32) -> Self {
+        Self(self.1.splat_f32s(x), self.1)
+    }
+
+    /// Zero where it is less, or no number.
+    #[inline(always)]
+    fn at_least_0(self) -> Self {
+        let zero = self.of(0.0);
+        Self::either(self.is_above(zero), self, zero)
+    }
 }
 
 /// At most the angle, up to π, of which these are sine and cosine: twice Shafer's bound of the arctangent,
 /// 3τ / (1 + 2 √(1 + τ²)), for that of its half.
 #[inline(always)]
-fn less_than_angle(sine: f32, cosine: f32) -> f32 {
-    let more = at_least_0(1.0 + cosine);
-    let bound = 6.0 * sine / (more + (8.0 * more).sqrt());
+fn less_than_angle<S: Simd>(sine: Many<S>, cosine: Many<S>) -> Many<S> {
+    let more = (sine.of(1.0) + cosine).at_least_0();
+    let bound = sine.of(6.0) * sine / (more + (sine.of(8.0) * more).sqrt());
     // What it tends to: near π rounding could make more of it.
-    if bound < 3.0 { bound } else { 3.0 }
+    let most = sine.of(3.0);
+    Many::either(bound.is_below(most), bound, most)
 }
 
 /// At least asin x, of 0…1.
 #[inline(always)]
-fn more_than_asin(x: f32) -> f32 {
+fn more_than_asin<S: Simd>(x: Many<S>) -> Many<S> {
     // x over asin x falls steadily.
-    let steep = if x < 0.5 { 1.048 } else { 1.571 };
-    x * if x < 0.25 { 1.011 } else { steep }
+    let steep = Many::either(x.is_below(x.of(0.5)), x.of(1.048), x.of(1.571));
+    x * Many::either(x.is_below(x.of(0.25)), x.of(1.011), steep)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pulp::Scalar;
     use std::f64::consts::PI;
 
     #[test]
@@ -352,7 +396,8 @@ mod tests {
             .chain(near_pi)
         {
             let (sine, cosine) = angle.sin_cos();
-            let bound = f64::from(less_than_angle(sine.max(0.0) as f32, cosine as f32));
+            let [sine, cosine] = [sine.max(0.0), cosine].map(|x| Many(x as f32, Scalar::new()));
+            let bound = f64::from(less_than_angle(sine, cosine).0);
             assert!(
                 bound <= angle + 0.1 * f64::from(ROUNDING),
                 "{angle}: {bound}"
