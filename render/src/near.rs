@@ -24,6 +24,8 @@ pub(crate) struct Near {
     pub sight: f64,
     /// What `within` need have been; zero where nothing is known of it.
     pub reach: f64,
+    /// The least difference of those that count.
+    pub smallest: f64,
 }
 
 /// Source views that are asked before it is seen whether others may count, and again after so many more.
@@ -45,15 +47,51 @@ impl Near {
     /// For a point nearby, of the difference that matters there. `None` where this one does not tell: at
     /// infinity, and where a view has the very ray.
     pub(crate) fn guess(&self) -> Option<f64> {
-        (self.reach > SAME_RAY).then_some(MARGIN * self.reach)
+        (self.reach > SAME_RAY).then(|| self.beyond(MARGIN))
+    }
+
+    /// So many times as far from the smallest difference as it reaches. Where all that count differ alike, as where photos
+    /// are coarser than the view, a difference half as large again finds several times as many views.
+    fn beyond(&self, times: f64) -> f64 {
+        let beyond = self.smallest + times * (self.reach - self.smallest);
+        beyond.max(LEAST_MARGIN * self.reach)
+    }
+
+    /// What `within` need have been with room to spare, however alike all that count differ: for what lies beside it.
+    pub(crate) fn within_generously(&self) -> f64 {
+        self.within.max(MARGIN * self.reach)
+    }
+
+    /// Notes what need have been asked for, and lets go of what a point nearby needed and this one does not: triangles
+    /// look at all that is left.
+    fn settle(&mut self, reach: f64) {
+        self.reach = reach;
+        let shown = self
+            .candidates
+            .iter()
+            .filter(|c| c.mask > 0.0 && c.fov > 0.0);
+        self.smallest = shown.map(|c| c.diff).fold(reach, f64::min);
+        let most = self.beyond(KEPT);
+        if reach <= SAME_RAY || most >= self.within {
+            return;
+        }
+        self.within = most;
+        let mut of_views = self.of_views.iter();
+        let stays =
+            |view: Option<&(f64, Option<Pixel>)>| view.is_some_and(|(diff, _)| *diff <= most);
+        self.views.retain(|_| stays(of_views.next()));
+        self.of_views.retain(|view| stays(Some(view)));
+        self.candidates.retain(|c| c.diff <= most);
     }
 }
 
 /// From one guess to the next, and the last.
 const WIDER: f64 = 3.0;
 const WIDEST: f64 = 4.0;
-/// A guess for the next point, over what this one needed.
+/// A guess for the next point, over what this one needed; and what is kept of more than that.
 const MARGIN: f64 = 1.2;
+const KEPT: f64 = 1.5;
+const LEAST_MARGIN: f64 = 1.05;
 
 /// The difference to try after one within which too few views were found.
 pub(crate) fn wider(within: f64) -> f64 {
@@ -179,7 +217,7 @@ impl Frame<'_> {
             // Nor can more be found where it is no number.
             if !(reach > near.within) {
                 if ball.is_some() && reach < f64::INFINITY {
-                    near.reach = reach;
+                    near.settle(reach);
                 }
                 return near;
             }
@@ -202,6 +240,54 @@ impl Frame<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What is let go is what differs by much more than what counts, beside one another in all lists; and where all that
+    /// count differ alike, a guess is not far beyond.
+    #[test]
+    fn what_a_neighbour_needed_and_a_point_does_not_is_let_go() {
+        for (smallest, guess, kept) in [(0.0, 1.2, 7), (0.8, 1.05, 6), (1.0, 1.05, 5)] {
+            // Every other one is out of its photo; the last but one is what is reached.
+            let diffs = [smallest, 0.95, 0.97, 1.0, smallest, 1.09, 1.4, 1.6, 2.0];
+            let candidate = |(diff, source_idx): (f64, usize)| Candidate {
+                source_idx,
+                diff,
+                fov: 1.0,
+                mask: 1.0,
+            };
+            let numbered = || diffs.into_iter().zip(0..);
+            let seen = numbered().filter(|(_, i)| i % 2 == 0);
+            let mut near = Near {
+                candidates: seen.map(candidate).collect(),
+                views: numbered().map(|(_, i)| i as u32).collect(),
+                of_views: diffs.map(|diff| (diff, None)).to_vec(),
+                within: 2.0,
+                ..Near::default()
+            };
+            near.settle(1.0);
+            assert!((near.guess().unwrap() - guess).abs() < 1e-12);
+            assert!(near.within >= near.guess().unwrap() && near.within < 2.0);
+            assert_eq!(near.views.len(), kept, "{smallest}");
+            let of_views = near.views.iter().zip(&near.of_views);
+            for (view, (diff, _)) in of_views {
+                assert_eq!(*diff, diffs[*view as usize]);
+            }
+            let is_kept = |i: usize| near.candidates.iter().any(|c| c.source_idx == i);
+            for (diff, i) in numbered() {
+                let within = diff <= near.within;
+                assert_eq!(near.views.contains(&(i as u32)), within, "{smallest} {i}");
+                assert_eq!(is_kept(i), within && i % 2 == 0, "{smallest} {i}");
+            }
+        }
+        // A view that has the very ray tells nothing of others.
+        let mut near = Near {
+            within: 2.0,
+            views: vec![3],
+            of_views: vec![(1.5, None)],
+            ..Near::default()
+        };
+        near.settle(SAME_RAY);
+        assert_eq!((near.guess(), near.views.len()), (None, 1));
+    }
 
     #[test]
     fn to_see_whether_others_count_takes_no_longer_than_to_ask() {

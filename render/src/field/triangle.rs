@@ -300,7 +300,8 @@ impl<'a> Triangle<'a> {
         views.dedup();
         let room = MAX_LISTED.saturating_sub(views.len());
         if room > 0 {
-            let most = self.asked().map(|near| near.within).fold(0.0, f64::max);
+            let most = self.asked().map(Near::within_generously);
+            let most = most.fold(0.0, f64::max);
             let mut others = Vec::new();
             frame.views_by_least(self.patch().ball().as_ref(), most, &mut others);
             others.retain(|i| views.binary_search(i).is_err());
