@@ -2,7 +2,7 @@
 
 use crate::blend::{Candidate, Contributor, SAME_RAY, blend};
 use crate::frame::{Frame, ProxyPoint};
-use crate::options::Resolution;
+use crate::options::{Blend, Resolution};
 use crate::reference::candidate;
 use crate::view_tree::{Around, Ball, Measure};
 use calibrate::Pixel;
@@ -24,7 +24,7 @@ pub(crate) struct Near {
     pub sight: f64,
     /// What `within` need have been; zero where nothing is known of it.
     pub reach: f64,
-    /// The least difference of those that count.
+    /// The least difference of those that count, where it says what those are that others count beside: else zero.
     pub smallest: f64,
 }
 
@@ -57,22 +57,15 @@ impl Near {
         beyond.max(LEAST_MARGIN * self.reach)
     }
 
-    /// What `within` need have been with room to spare, however alike all that count differ: for what lies beside it.
-    pub(crate) fn within_generously(&self) -> f64 {
-        self.within.max(MARGIN * self.reach)
+    /// A guess with room to spare, however alike all that count differ: for what lies beside the point.
+    pub(crate) fn generous_guess(&self) -> Option<f64> {
+        (self.reach > SAME_RAY).then_some(MARGIN * self.reach)
     }
 
-    /// Notes what need have been asked for, and lets go of what a point nearby needed and this one does not: triangles
-    /// look at all that is left.
-    fn settle(&mut self, reach: f64) {
-        self.reach = reach;
-        let shown = self
-            .candidates
-            .iter()
-            .filter(|c| c.mask > 0.0 && c.fov > 0.0);
-        self.smallest = shown.map(|c| c.diff).fold(reach, f64::min);
+    /// Lets go of what a point nearby needed and this one does not: triangles look at all that is left.
+    pub(crate) fn let_go(&mut self) {
         let most = self.beyond(KEPT);
-        if reach <= SAME_RAY || most >= self.within {
+        if self.reach <= SAME_RAY || most >= self.within {
             return;
         }
         self.within = most;
@@ -217,7 +210,14 @@ impl Frame<'_> {
             // Nor can more be found where it is no number.
             if !(reach > near.within) {
                 if ball.is_some() && reach < f64::INFINITY {
-                    near.settle(reach);
+                    near.reach = reach;
+                    if self.options.blend == Blend::Consistent {
+                        let shown = near
+                            .candidates
+                            .iter()
+                            .filter(|c| c.mask > 0.0 && c.fov > 0.0);
+                        near.smallest = shown.map(|c| c.diff).fold(reach, f64::min);
+                    }
                 }
                 return near;
             }
@@ -261,9 +261,11 @@ mod tests {
                 views: numbered().map(|(_, i)| i as u32).collect(),
                 of_views: diffs.map(|diff| (diff, None)).to_vec(),
                 within: 2.0,
+                reach: 1.0,
+                smallest,
                 ..Near::default()
             };
-            near.settle(1.0);
+            near.let_go();
             assert!((near.guess().unwrap() - guess).abs() < 1e-12);
             assert!(near.within >= near.guess().unwrap() && near.within < 2.0);
             assert_eq!(near.views.len(), kept, "{smallest}");
@@ -283,9 +285,10 @@ mod tests {
             within: 2.0,
             views: vec![3],
             of_views: vec![(1.5, None)],
+            reach: SAME_RAY,
             ..Near::default()
         };
-        near.settle(SAME_RAY);
+        near.let_go();
         assert_eq!((near.guess(), near.views.len()), (None, 1));
     }
 

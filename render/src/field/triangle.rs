@@ -236,7 +236,7 @@ impl<'a> Triangle<'a> {
         let mut guess = within.into_iter().fold(self.frame.first_guess(), f64::max);
         let near = |point| {
             let near = self.frame.near(&point, sight, guess);
-            guess = near.guess().unwrap_or(guess);
+            guess = near.generous_guess().unwrap_or(guess);
             near
         };
         points.map(near).collect()
@@ -300,8 +300,10 @@ impl<'a> Triangle<'a> {
         views.dedup();
         let room = MAX_LISTED.saturating_sub(views.len());
         if room > 0 {
-            let most = self.asked().map(Near::within_generously);
-            let most = most.fold(0.0, f64::max);
+            let most = self
+                .asked()
+                .flat_map(|near| [Some(near.within), near.generous_guess()]);
+            let most = most.flatten().fold(0.0, f64::max);
             let mut others = Vec::new();
             frame.views_by_least(self.patch().ball().as_ref(), most, &mut others);
             others.retain(|i| views.binary_search(i).is_err());

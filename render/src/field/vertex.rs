@@ -50,9 +50,10 @@ impl Vertex {
             .lens
             .unproject(Pixel::new(seen_at.x, seen_at.y));
         let point = point_at(frame, seen_at, ray, cell);
-        let near = point.map_or_else(Near::default, |point| {
+        let mut near = point.map_or_else(Near::default, |point| {
             frame.near(&point, extent(frame, at, cell, &point), guess)
         });
+        near.let_go();
         Self {
             at,
             point,
