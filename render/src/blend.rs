@@ -103,19 +103,22 @@ pub fn blend(candidates: &[Candidate], options: &FieldOptions) -> Vec<Contributo
 }
 
 impl FieldOptions {
-    /// The difference beyond which no further candidate could change the weights of these;
-    /// infinite while any could.
-    pub(crate) fn reach(&self, candidates: &[Candidate]) -> f64 {
+    /// The least difference of these that weights count from (zero where they count from none), and the one beyond which no
+    /// further candidate could change the weights of these; infinite while any could.
+    pub(crate) fn reach(&self, candidates: &[Candidate]) -> (f64, f64) {
         let shown = candidates.iter().filter(|c| c.mask > 0.0 && c.fov > 0.0);
         let mut sorted: Vec<(f64, f64)> = shown.map(|c| (c.diff, c.fov * c.mask)).collect();
         sorted.sort_by(|x, y| x.0.total_cmp(&y.0));
         let Some(&(smallest, _)) = sorted.first() else {
-            return f64::INFINITY;
+            return (0.0, f64::INFINITY);
         };
         match self.blend {
-            Blend::Consistent if smallest <= SAME_RAY => SAME_RAY,
-            Blend::Consistent => threshold(&sorted, self.full_weight()),
-            Blend::Paper => sorted.get(self.k - 1).map_or(f64::INFINITY, |s| s.0),
+            Blend::Consistent if smallest <= SAME_RAY => (smallest, SAME_RAY),
+            Blend::Consistent => (smallest, threshold(&sorted, self.full_weight())),
+            Blend::Paper => {
+                let nth = sorted.get(self.k - 1);
+                (0.0, nth.map_or(f64::INFINITY, |s| s.0))
+            }
         }
     }
 

@@ -2,7 +2,7 @@
 
 use crate::blend::{Candidate, Contributor, SAME_RAY, blend};
 use crate::frame::{Frame, ProxyPoint};
-use crate::options::{Blend, Resolution};
+use crate::options::Resolution;
 use crate::reference::candidate;
 use crate::view_tree::{Around, Ball, Measure};
 use calibrate::Pixel;
@@ -24,7 +24,7 @@ pub(crate) struct Near {
     pub sight: f64,
     /// What `within` need have been; zero where nothing is known of it.
     pub reach: f64,
-    /// The least difference of those that count, where it says what those are that others count beside: else zero.
+    /// The least difference that weights count from.
     pub smallest: f64,
 }
 
@@ -70,10 +70,9 @@ impl Near {
         }
         self.within = most;
         let mut of_views = self.of_views.iter();
-        let stays =
-            |view: Option<&(f64, Option<Pixel>)>| view.is_some_and(|(diff, _)| *diff <= most);
-        self.views.retain(|_| stays(of_views.next()));
-        self.of_views.retain(|view| stays(Some(view)));
+        self.views
+            .retain(|_| of_views.next().is_some_and(|(diff, _)| *diff <= most));
+        self.of_views.retain(|(diff, _)| *diff <= most);
         self.candidates.retain(|c| c.diff <= most);
     }
 }
@@ -206,18 +205,12 @@ impl Frame<'_> {
                 let seen = pixel.and_then(|p| candidate(self, source_idx, point, p, || diff));
                 near.candidates.extend(seen);
             }
-            let reach = self.options.reach(&near.candidates);
+            let (smallest, reach) = self.options.reach(&near.candidates);
             // Nor can more be found where it is no number.
             if !(reach > near.within) {
                 if ball.is_some() && reach < f64::INFINITY {
                     near.reach = reach;
-                    if self.options.blend == Blend::Consistent {
-                        let shown = near
-                            .candidates
-                            .iter()
-                            .filter(|c| c.mask > 0.0 && c.fov > 0.0);
-                        near.smallest = shown.map(|c| c.diff).fold(reach, f64::min);
-                    }
+                    near.smallest = smallest;
                 }
                 return near;
             }
@@ -246,7 +239,7 @@ mod tests {
     #[test]
     fn what_a_neighbour_needed_and_a_point_does_not_is_let_go() {
         for (smallest, guess, kept) in [(0.0, 1.2, 7), (0.8, 1.05, 6), (1.0, 1.05, 5)] {
-            // Every other one is out of its photo; the last but one is what is reached.
+            // Every other one is out of its photo; the fourth is what is reached.
             let diffs = [smallest, 0.95, 0.97, 1.0, smallest, 1.09, 1.4, 1.6, 2.0];
             let candidate = |(diff, source_idx): (f64, usize)| Candidate {
                 source_idx,

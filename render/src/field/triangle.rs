@@ -300,10 +300,8 @@ impl<'a> Triangle<'a> {
         views.dedup();
         let room = MAX_LISTED.saturating_sub(views.len());
         if room > 0 {
-            let most = self
-                .asked()
-                .flat_map(|near| [Some(near.within), near.generous_guess()]);
-            let most = most.flatten().fold(0.0, f64::max);
+            let most = |near: &Near| near.within.max(near.generous_guess().unwrap_or(0.0));
+            let most = self.asked().map(most).fold(0.0, f64::max);
             let mut others = Vec::new();
             frame.views_by_least(self.patch().ball().as_ref(), most, &mut others);
             others.retain(|i| views.binary_search(i).is_err());

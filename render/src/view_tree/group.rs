@@ -184,6 +184,7 @@ impl Group {
     /// and by how much each differs at least: by nothing where that is no number.
     #[inline(always)]
     pub(super) fn bounded<S: Simd>(&self, simd: S, query: &Query) -> ([u32; GROUP], Each) {
+        const { assert!(GROUP.is_multiple_of(S::F32_LANES), "whole vectors") };
         let (mut may, mut least) = ([0; GROUP], [0.0; GROUP]);
         let (may_parts, _) = S::as_mut_simd_u32s(&mut may);
         let (least_parts, _) = S::as_mut_simd_f32s(&mut least);
