@@ -30,10 +30,10 @@ pub(crate) fn render_through(
         .par_chunks_mut(4 * width.max(1) as usize)
         .enumerate()
         .for_each(|(row, out)| {
-            let mut rays = Vec::new();
+            let (mut rays, mut found) = (Vec::new(), Found::default());
             for (column, rgba) in out.chunks_exact_mut(4).enumerate() {
                 lens_rays.rays_within(view, column, row, side, &mut rays);
-                let (mean, hits) = mean_color(scene, view, &order, &mut rays);
+                let (mean, hits) = mean_color(scene, view, &order, &mut rays, &mut found);
                 if hits > 0 {
                     rgba[..3].copy_from_slice(&srgb_from_linear(mean.to_array()));
                     let coverage = f64::from(hits) / f64::from(side * side);
@@ -44,6 +44,17 @@ pub(crate) fn render_through(
     RgbaImage::from_raw(width, height, bytes).expect("four bytes a pixel")
 }
 
+/// What a pixel's rays find: the lists are there for the next pixel's.
+#[derive(Default)]
+struct Found {
+    /// The objects that they can meet, and how far away these are.
+    candidates: Vec<(f64, usize)>,
+    /// What each ray meets, and the ray.
+    seen: Vec<(Seen, DVec3)>,
+    /// The light at some of these places.
+    lights: Vec<(usize, Light)>,
+}
+
 /// The mean colour that a pixel's rays (unit length, camera frame) see, and how many of
 /// them meet something. `order` is the scene's, as the camera sees it.
 fn mean_color(
@@ -51,7 +62,13 @@ fn mean_color(
     view: &View,
     order: &[(f64, usize)],
     rays: &mut [DVec3],
+    found: &mut Found,
 ) -> (DVec3, u32) {
+    let Found {
+        candidates,
+        seen,
+        lights,
+    } = found;
     let center = view.center();
     let world_from_camera = view.camera_from_world.rotation.conjugate();
     for ray in rays.iter_mut() {
@@ -64,20 +81,24 @@ fn mean_color(
     let sines = rays.iter().map(|ray| ray.cross(axis).length());
     let sin_angle = 1.001 * sines.fold(1e-12, f64::max);
     let near_axis = |i: usize| scene.placed[i].near_ray(center, axis, sin_angle, 0.0);
-    let candidates: Vec<_> = order.iter().copied().filter(|o| near_axis(o.1)).collect();
-    let seen: Vec<_> = rays
-        .iter()
-        .filter_map(|&ray| Some((scene.look_in_order(center, ray, &candidates)?, ray)))
-        .collect();
+    candidates.clear();
+    candidates.extend(order.iter().copied().filter(|o| near_axis(o.1)));
+    seen.clear();
+    seen.extend(
+        rays.iter()
+            .filter_map(|&ray| Some((scene.look_in_order(center, ray, candidates)?, ray))),
+    );
     // 2. Light changes slowly over a surface: it is worked out once for each side of each
     // object in the pixel, at the ray nearest to the middle. Textures, highlights and
     // mirror images are not.
     let middle = seen.len() / 2;
-    let mut lights: Vec<(&Seen, Light)> = Vec::new();
+    lights.clear();
     let mut sum = DVec3::ZERO;
     for k in 0..seen.len() {
-        let (place, ray) = &seen[(middle + k) % seen.len()];
-        let known = lights.iter().find(|(other, _)| {
+        let i = (middle + k) % seen.len();
+        let (place, ray) = &seen[i];
+        let known = lights.iter().find(|(at, _)| {
+            let other = &seen[*at].0;
             other.object_idx == place.object_idx
                 && other.surface.face == place.surface.face
                 && other.normal.dot(place.normal) > 0.98
@@ -86,9 +107,8 @@ fn mean_color(
         let light = match known {
             Some(&(_, light)) => light,
             None => {
-                let near = scene.surroundings(place.point);
-                let light = scene.light(place, &near);
-                lights.push((place, light));
+                let light = scene.light(place);
+                lights.push((i, light));
                 light
             }
         };

@@ -133,13 +133,10 @@ impl Scene {
     pub fn trace(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
         let direction = direction.normalize();
         let seen = self.look(origin, direction)?;
-        let near = self.surroundings(seen.point);
         Some(Hit {
             point: seen.point,
             normal: seen.normal,
-            color: self
-                .shade(&seen, direction, self.light(&seen, &near))
-                .to_array(),
+            color: self.shade(&seen, direction, self.light(&seen)).to_array(),
             distance: seen.distance,
             object_idx: seen.object_idx,
         })

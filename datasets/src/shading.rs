@@ -15,7 +15,7 @@ const CORNER_TAPS: [(f64, f64); 3] = [(0.1, 0.4), (0.35, 0.35), (1.0, 0.25)];
 
 /// The objects that can change the light at some point; all others are too far away. Leaving those out changes nothing but the time it takes.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Surroundings {
+struct Surroundings {
     /// May stand before the lamp.
     casters: Vec<usize>,
     /// Near enough to darken a corner.
@@ -33,18 +33,19 @@ pub(crate) struct Light {
 
 impl Scene {
     /// The light at a place.
-    pub(crate) fn light(&self, seen: &Seen, near: &Surroundings) -> Light {
+    pub(crate) fn light(&self, seen: &Seen) -> Light {
         if self.objects[seen.object_idx].material.finish == Finish::Flat {
             return Light {
                 open: 1.0,
                 lamp: 1.0,
             };
         }
+        let near = self.surroundings(seen.point);
         let faces_lamp = seen.normal.dot(self.lighting.lamp - seen.point) > 0.0;
         Light {
-            open: self.openness(seen, near),
+            open: self.openness(seen, &near),
             lamp: if faces_lamp {
-                self.lamp_visibility(seen, near)
+                self.lamp_visibility(seen, &near)
             } else {
                 0.0
             },
@@ -52,7 +53,7 @@ impl Scene {
     }
 
     /// What can change the light at a point.
-    pub(crate) fn surroundings(&self, point: DVec3) -> Surroundings {
+    fn surroundings(&self, point: DVec3) -> Surroundings {
         let slack = 2.0 * LIFT;
         let to_lamp = self.lighting.lamp - point;
         let distance = to_lamp.length();
@@ -87,10 +88,7 @@ impl Scene {
         let reflected = direction + 2.0 * facing * seen.normal;
         let lifted = seen.point + LIFT * seen.normal;
         let image = match self.look(lifted, reflected) {
-            Some(there) => {
-                let near = self.surroundings(there.point);
-                self.lit(&there, reflected, self.light(&there, &near))
-            }
+            Some(there) => self.lit(&there, reflected, self.light(&there)),
             None => DVec3::ZERO,
         };
         // What is hidden from the light is hidden from the reflected room, too.

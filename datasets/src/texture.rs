@@ -8,6 +8,7 @@ use crate::print::{self, glyphs};
 use crate::shape::{Surface, TURN, longitude};
 use glam::{DVec2, DVec3};
 use proxy::mesh::linear_from_srgb;
+use std::sync::LazyLock;
 
 /// A texture. Lengths are world units, colours linear light, `seed` chooses its noise.
 #[derive(Clone, Debug, PartialEq)]
@@ -213,7 +214,10 @@ impl Texture {
 
 /// The linear light of an sRGB colour such as 0xff8000.
 pub(crate) fn rgb(hex: u32) -> DVec3 {
-    let channel = |shift: u32| linear_from_srgb(f64::from((hex >> shift) & 0xff) / 255.0);
+    // Textures ask for the same few at every sample: their powers are taken once.
+    static LINEAR: LazyLock<[f64; 256]> =
+        LazyLock::new(|| std::array::from_fn(|code| linear_from_srgb(code as f64 / 255.0)));
+    let channel = |shift: u32| LINEAR[((hex >> shift) & 0xff) as usize];
     DVec3::new(channel(16), channel(8), channel(0))
 }
 
