@@ -65,7 +65,7 @@ fn photos_of_another_house_do_so_too() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let survey = "--photos 160 --size 192x144";
+    let survey = "--photos 120 --size 128x96";
     same_from_model_and_photos(folder.path(), &model, survey);
 }
 

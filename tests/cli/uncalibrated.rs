@@ -68,8 +68,9 @@ fn pose_errors(found: &Reconstruction, truth: &Reconstruction) -> (f64, f64) {
 }
 
 /// The photos of the shelf alone, and the truth about them.
-fn shelf_photos(folder: &Path) -> Reconstruction {
-    lumigraph(folder, "generate shelf --size 640x480 --photos 9 -o shelf").ok();
+fn shelf_photos(folder: &Path, size: &str) -> Reconstruction {
+    let line = format!("generate shelf --size {size} --photos 9 -o shelf");
+    lumigraph(folder, &line).ok();
     let truth = colmap::read_model(&folder.join("shelf/sparse/0")).unwrap();
     fs::rename(folder.join("shelf/images"), folder.join("photos")).unwrap();
     truth
@@ -81,7 +82,7 @@ fn colmap_places_all_photos_of_the_shelf() {
         return;
     }
     let here = tempfile::tempdir().unwrap();
-    let truth = shelf_photos(here.path());
+    let truth = shelf_photos(here.path(), "640x480");
     fs::write(here.path().join("photos/notes.jpg"), "not a photo").unwrap();
 
     let ran = lumigraph(here.path(), "import photos -o scene").ok();
@@ -191,7 +192,7 @@ fn a_video_becomes_a_scene_with_times() {
         return;
     }
     let here = tempfile::tempdir().unwrap();
-    let truth = shelf_photos(here.path());
+    let truth = shelf_photos(here.path(), "320x240");
     let names: Vec<&str> = poses(&truth).into_keys().collect();
     // Every photo is there twice, the second time out of focus.
     for (i, name) in names.iter().enumerate() {
