@@ -1,6 +1,6 @@
 //! Interiors: a house is generated, made an interior of anew, and planned.
 
-use crate::run::{files, lumigraph};
+use crate::run::{files, folder_with, lumigraph};
 use glam::DVec3;
 use proxy::interior::read_interior;
 use proxy::mesh::{Mesh, model_to_glb, read_model};
@@ -11,11 +11,11 @@ use tempfile::TempDir;
 
 /// A folder with a small house.
 pub(crate) fn with_house() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let line = "generate house --rooms 2 --triangles 1 -o house";
-    let ran = lumigraph(folder.path(), line).ok();
-    assert!(ran.stdout.starts_with("house: 2 cells, "), "{}", ran.stdout);
-    folder
+    folder_with("a small house", |folder| {
+        let line = "generate house --rooms 2 --triangles 1 -o house";
+        let ran = lumigraph(folder, line).ok();
+        assert!(ran.stdout.starts_with("house: 2 cells, "), "{}", ran.stdout);
+    })
 }
 
 pub(crate) fn names(folder: &Path) -> Vec<String> {

@@ -1,7 +1,7 @@
 //! Interiors of captures of which a part is damaged.
 
 use crate::interior::HALVES;
-use crate::run::{Ran, lumigraph, with_wall};
+use crate::run::{Ran, lumigraph, with_generated, with_wall};
 use std::fs;
 use std::path::Path;
 
@@ -107,9 +107,8 @@ fn a_damaged_photo_is_left_out_where_the_mesh_is_the_scenes_own() {
 /// LDIs of views take far longer.
 #[test]
 fn that_no_depth_map_can_be_used_is_told_before_any_frame_is_drawn() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = with_generated("hallway --size 96x72 -o hall");
     let here = folder.path();
-    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
     fs::write(here.join("halves.json"), HALVES).unwrap();
     lumigraph(here, "interior hall --rooms halves.json -o two").ok();
     for entry in fs::read_dir(here.join("hall/depth")).unwrap() {

@@ -1,7 +1,7 @@
 //! A house of hallways: parts without a door, and a world upside down.
 
 use crate::interior::HALVES;
-use crate::run::lumigraph;
+use crate::run::{lumigraph, with_generated};
 use glam::{DQuat, DVec3};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -50,9 +50,8 @@ fn hallways(here: &Path, from: &str, to: &str, world: DQuat, copies: u32) {
 
 #[test]
 fn one_room_parts_without_a_door_and_a_world_upside_down_are_toured() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = with_generated("hallway --size 96x72 -o hall");
     let here = folder.path();
-    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
     // 1. One room.
     let ran = lumigraph(here, "interior hall -o one").ok();
     assert!(

@@ -1,7 +1,7 @@
 //! Interiors out of photos: the same as of the model, and drawn from the photos.
 
 use crate::interior::{HALVES, apart, corners, names, with_house};
-use crate::run::lumigraph;
+use crate::run::{lumigraph, with_generated};
 use crate::uncalibrated::is_installed;
 use calibrate::{ModelKind, Reconstruction, colmap};
 use glam::DQuat;
@@ -115,9 +115,8 @@ fn held_out_photos_of_lenses_that_bend_are_told_with_what_helps() {
 
 #[test]
 fn a_captures_rooms_are_drawn_from_its_photos() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = with_generated("hallway --size 96x72 -o hall");
     let here = folder.path();
-    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
     std::fs::write(here.join("halves.json"), HALVES).unwrap();
     let made = "interior hall --rooms halves.json --hold-out hall/split.json -o two";
     let ran = lumigraph(here, made).ok();
@@ -265,9 +264,8 @@ fn rooms_that_photos_show_little_of_are_named_after_a_walk() {
 
 #[test]
 fn a_capture_without_depth_needs_a_mesh() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = with_generated("hallway --size 96x72 -o hall");
     let here = folder.path();
-    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
     std::fs::remove_dir_all(here.join("hall/depth")).unwrap();
     let error = lumigraph(here, "interior hall -o none").error(1);
     assert!(error.contains("no depth maps"), "{error}");
@@ -335,9 +333,8 @@ fn rooms_of_photos_that_do_not_say_what_is_up_have_what_cameras_had() {
 
 #[test]
 fn triangles_in_no_cell_are_counted_alike_where_rooms_are_made_and_walked_through() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = with_generated("hallway --size 96x72 -o hall");
     let here = folder.path();
-    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
     let rooms = |high: f64| {
         let text = format!(
             r#"{{"version": 1, "rooms": [{{"name": "low", "min": [-9, -9, -9], "max": [8, {high}, 8]}}]}}"#

@@ -1,7 +1,7 @@
 //! LDIs made as files, and walks that read them.
 
 use crate::interior::{names, with_house};
-use crate::run::{files, lumigraph};
+use crate::run::{files, lumigraph, with_generated};
 use serde_json::Value;
 use std::path::Path;
 
@@ -231,9 +231,8 @@ fn layered_images_of_other_files_or_options_are_not_used() {
 
 #[test]
 fn layered_images_of_photos_are_read_by_walks_with_the_same_photos() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = with_generated("hallway --size 96x72 -o hall");
     let here = folder.path();
-    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
     std::fs::write(here.join("halves.json"), crate::interior::HALVES).unwrap();
     lumigraph(here, "interior hall --rooms halves.json -o house").ok();
     for more in ["", " --ldi-from views --ldi-views 5", " --no-photos"] {
@@ -281,9 +280,8 @@ fn layered_images_of_photos_are_read_by_walks_with_the_same_photos() {
 
 #[test]
 fn options_that_change_nothing_of_a_captures_rooms_are_said_to() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = with_generated("hallway --size 96x72 -o hall");
     let here = folder.path();
-    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
     std::fs::write(here.join("halves.json"), crate::interior::HALVES).unwrap();
     lumigraph(here, "interior hall --rooms halves.json -o house").ok();
     let walk = WALK.replace("--frames 8", "--frames 1");

@@ -4,6 +4,7 @@ use datasets::Options;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use tempfile::TempDir;
 
 /// What a run left.
@@ -90,18 +91,48 @@ pub(crate) fn with_script(folder: &Path, program: &str, script: &str) -> String 
     std::env::join_paths(paths).unwrap().into_string().unwrap()
 }
 
+/// A folder with what `make` puts into it. What has the same `name` is made once, as many tests begin
+/// with it.
+pub(crate) fn folder_with(name: &str, make: impl FnOnce(&Path)) -> TempDir {
+    type Made = Arc<OnceLock<BTreeMap<PathBuf, Vec<u8>>>>;
+    static MADE: Mutex<BTreeMap<String, Made>> = Mutex::new(BTreeMap::new());
+    let known = {
+        let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
+        Arc::clone(made.entry(name.to_owned()).or_default())
+    };
+    let made = known.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        make(folder.path());
+        files(folder.path())
+    });
+    let folder = tempfile::tempdir().unwrap();
+    for (file, bytes) in made {
+        let path = folder.path().join(file);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, bytes).unwrap();
+    }
+    folder
+}
+
+/// A folder with what `lumigraph generate` writes there.
+pub(crate) fn with_generated(options: &str) -> TempDir {
+    folder_with(options, |folder| {
+        lumigraph(folder, &format!("generate {options}")).ok();
+    })
+}
+
 /// A folder with `wall`, a capture of nine 96 × 72 photos of which 0000.png and 0008.png
 /// are to be held out.
 pub(crate) fn with_wall() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let options = Options {
-        size: Some((96, 72)),
-        samples_per_side: Some(1),
-        ..Options::default()
-    };
-    let wall = datasets::by_name("wall", &options).unwrap();
-    datasets::write(&wall, &folder.path().join("wall")).unwrap();
-    folder
+    folder_with("a small wall", |folder| {
+        let options = Options {
+            size: Some((96, 72)),
+            samples_per_side: Some(1),
+            ..Options::default()
+        };
+        let wall = datasets::by_name("wall", &options).unwrap();
+        datasets::write(&wall, &folder.join("wall")).unwrap();
+    })
 }
 
 /// Every file below a folder with its bytes.

@@ -1,15 +1,12 @@
 //! Kinds of surface, and the choice between them.
 
-use crate::run::{files, lumigraph, with_wall};
+use crate::run::{files, lumigraph, with_generated, with_wall};
 use serde_json::Value;
 use std::path::Path;
 
 /// A folder with a small capture of the given scene.
 fn with(name: &str) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let line = format!("generate {name} --size 96x72 -o {name}");
-    lumigraph(folder.path(), &line).ok();
-    folder
+    with_generated(&format!("{name} --size 96x72 -o {name}"))
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Scenes that move, through the command line.
 
-use crate::run::{files, lumigraph, with_wall};
+use crate::run::{files, folder_with, lumigraph, with_wall};
 use calibrate::{View, colmap};
 use datasets::Options;
 use image::RgbaImage;
@@ -10,15 +10,15 @@ use tempfile::TempDir;
 
 /// A folder with `helicopter`, a capture of sixty 64 × 48 photos with times.
 fn with_helicopter() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let options = Options {
-        size: Some((64, 48)),
-        views: Some(60),
-        samples_per_side: Some(2),
-    };
-    let helicopter = datasets::by_name("helicopter", &options).unwrap();
-    datasets::write(&helicopter, &folder.path().join("helicopter")).unwrap();
-    folder
+    folder_with("a small helicopter", |folder| {
+        let options = Options {
+            size: Some((64, 48)),
+            views: Some(60),
+            samples_per_side: Some(2),
+        };
+        let helicopter = datasets::by_name("helicopter", &options).unwrap();
+        datasets::write(&helicopter, &folder.join("helicopter")).unwrap();
+    })
 }
 
 #[test]

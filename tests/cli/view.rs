@@ -1,6 +1,6 @@
 //! `lumigraph view` in a real window on a virtual screen, with real keys and a real mouse.
 
-use crate::run::{lumigraph, with_wall};
+use crate::run::{lumigraph, with_generated, with_wall};
 use crate::screen::{SIZE, Screen, Window, has_tools, is_settled, pixels, says, triple};
 use calibrate::{Camera, Lens, Rigid3};
 use glam::{DVec2, DVec3};
@@ -306,10 +306,7 @@ fn door(interior: &Interior) -> &Portal {
 }
 
 fn with_house() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let line = "generate house --rooms 2 --triangles 1 -o house";
-    lumigraph(folder.path(), line).ok();
-    folder
+    with_generated("house --rooms 2 --triangles 1 -o house")
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Frames of earlier walks: counted, gone on with, and never mixed with others.
 
 use crate::interior::{HALVES, with_house};
-use crate::run::{files, lumigraph};
+use crate::run::{files, lumigraph, with_generated};
 use serde_json::Value;
 
 #[test]
@@ -56,9 +56,8 @@ fn images_and_layered_images_are_counted_apart_and_those_made_ahead_with_them() 
 
 #[test]
 fn frames_of_a_capture_calibrated_anew_are_not_mixed_in() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = with_generated("hallway --size 96x72 -o hall");
     let here = folder.path();
-    lumigraph(here, "generate hallway --size 96x72 -o hall").ok();
     std::fs::write(here.join("halves.json"), HALVES).unwrap();
     lumigraph(here, "interior hall --rooms halves.json -o house").ok();
     let frame = r#"{"transform": [[1,0,0,0],[0,1,0,0],[0,0,1,0]], "scale": 1}"#;

@@ -54,7 +54,7 @@ fn drawn(rooms: usize, seed: u32, views: u64) -> f64 {
     let (house, contents) = small_house(rooms, seed);
     let all = (0..views).into_par_iter();
     let drawn: Vec<f64> = all
-        .map(|i| check(&house, &contents, u64::from(seed) * 10_000 + i))
+        .map(|i| check(house, &contents, u64::from(seed) * 10_000 + i))
         .collect();
     let mean = drawn.iter().sum::<f64>() / views as f64;
     eprintln!(

@@ -5,7 +5,7 @@ use crate::house;
 use calibrate::View;
 use datasets::house::House;
 use glam::DVec3;
-use house::{room, small_house, view, viewpoint};
+use house::{own_house, room, view, viewpoint};
 use image::{Rgba, RgbaImage};
 use proxy::interior::{Contents, Portal};
 use proxy::mesh::Mesh;
@@ -31,7 +31,7 @@ struct Capture {
 
 /// Photos from some places of each room, around.
 fn capture(rooms: usize, around: u32) -> Capture {
-    let (mut house, mut contents) = small_house(rooms, 2);
+    let (mut house, mut contents) = own_house(rooms, 2);
     let mut photos = Vec::new();
     for cell in 0..house.interior.cells.len() {
         let bounds = room(&house.interior, cell);

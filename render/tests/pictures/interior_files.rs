@@ -3,7 +3,7 @@
 use crate::house;
 
 use calibrate::View;
-use house::{small_house, view, viewpoint};
+use house::{own_house, small_house, view, viewpoint};
 use proxy::interior::Interior;
 use render::RenderError;
 use render::interior::{FrameCost, Library, PortalFill, Target, Walk, WalkError, WalkOptions};
@@ -174,7 +174,7 @@ fn a_file_of_something_else_is_an_error_that_says_what_to_do() {
 
 #[test]
 fn every_side_has_a_name_of_its_own_that_any_file_system_takes() {
-    let (mut house, contents) = small_house(4, 3);
+    let (mut house, contents) = own_house(4, 3);
     let interior = &mut house.interior;
     let names = |interior: &Interior, of| {
         let library = Library::new(interior, &contents, &options(of).library);

@@ -60,7 +60,7 @@ fn pictures_of_triangles_are_those_of_rays() {
     for seed in 0..40 {
         let (eye, target) = viewpoint(&house.interior, seed);
         let view = view_of(eye, target, [160, 120]);
-        let (truth, depths) = datasets::house::render(&house, &view);
+        let (truth, depths) = datasets::house::render(house, &view);
         let ours = draw(&house.model, &[all.all()], &view, false);
         let (w, o) = compare(&ours, &truth, &depths);
         pixels += depths.len();

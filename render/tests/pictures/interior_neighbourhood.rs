@@ -166,7 +166,7 @@ fn ldis_of_the_nearest_views_show_no_less_than_those_of_all() {
                 if contents.locate(interior, view.center()) != Some(side.from) {
                     continue;
                 }
-                let (truth, depths) = datasets::house::render(&house, &view);
+                let (truth, depths) = datasets::house::render(house, &view);
                 let pixels = beyond(interior, side, &view, &depths);
                 for (walk, sums) in walks.iter_mut().zip(&mut sums) {
                     let cost = walk.draw(&view, PortalFill::Ldi).unwrap();

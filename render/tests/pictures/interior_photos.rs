@@ -6,7 +6,7 @@ use calibrate::{Distortion, Lens, Rigid3, View};
 use capture::DepthMap;
 use datasets::house::House;
 use glam::DVec3;
-use house::{random, small_house};
+use house::{own_house, random};
 use image::RgbaImage;
 use proxy::interior::{Contents, SemicircleOptions, SemicircleView};
 use proxy::{MeshKind, Proxy, Solid};
@@ -35,7 +35,7 @@ struct Taken {
 /// Photos through the lenses that images before portals have, bent so much. Their inverse depths have
 /// so much noise.
 fn taken(deviation: f64, bend: f64) -> Taken {
-    let (mut house, contents) = small_house(2, 2);
+    let (mut house, contents) = own_house(2, 2);
     let geometry = CellGeometry::new(&house.model, &contents);
     let places = proxy::interior::semicircles(&house.interior, &contents, &semicircles());
     let sides: Vec<&[SemicircleView]> = places.chunks(VIEWS).collect();

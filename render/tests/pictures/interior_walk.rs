@@ -19,7 +19,7 @@ use std::path::Path;
 
 /// A house, and what its semicircles see, some of them.
 struct Set {
-    house: datasets::house::House,
+    house: &'static datasets::house::House,
     references: Vec<Reference>,
 }
 
@@ -236,7 +236,7 @@ fn before(
 #[test]
 fn what_images_show_is_close_to_what_is_there() {
     let (house, contents) = small_house(4, 2);
-    let mut walk = walk_of(&house, &contents);
+    let mut walk = walk_of(house, &contents);
     let places = semicircles(
         &house.interior,
         &contents,
@@ -256,7 +256,7 @@ fn what_images_show_is_close_to_what_is_there() {
             if Some(cell) != place.from {
                 continue;
             }
-            let (truth, _) = datasets::house::render(&house, &desired);
+            let (truth, _) = datasets::house::render(house, &desired);
             count += 1.0;
             for (k, fill) in PortalFill::ALL.into_iter().enumerate() {
                 let cost = walk.draw(&desired, fill).unwrap();
@@ -288,7 +288,7 @@ fn what_images_show_is_close_to_what_is_there() {
 #[test]
 fn columns_out_of_sight_are_missed_by_no_pixel() {
     let (house, contents) = small_house(5, 4);
-    let mut walk = walk_of(&house, &contents);
+    let mut walk = walk_of(house, &contents);
     let options = WalkOptions {
         whole_ldis: true,
         ..WalkOptions::default()
@@ -310,7 +310,7 @@ fn columns_out_of_sight_are_missed_by_no_pixel() {
 #[test]
 fn whole_cells_make_the_same_pictures() {
     let (house, contents) = small_house(4, 5);
-    let mut walk = walk_of(&house, &contents);
+    let mut walk = walk_of(house, &contents);
     let options = WalkOptions {
         whole_cells: true,
         ..WalkOptions::default()
@@ -332,7 +332,7 @@ fn whole_cells_make_the_same_pictures() {
 #[test]
 fn near_a_portal_there_is_no_difference() {
     let (house, contents) = small_house(3, 1);
-    let mut walk = walk_of(&house, &contents);
+    let mut walk = walk_of(house, &contents);
     for portal in &house.interior.portals {
         for off in [0.9, 1e-3, 1e-9, 0.0, -1e-3, -0.9] {
             // One portal alone in sight: look through it, from its middle or from near it.
@@ -357,7 +357,7 @@ fn near_a_portal_there_is_no_difference() {
 fn nothing_pops_as_one_comes_nearer() {
     // Neither where images begin to be mixed in nor where they are all.
     let (house, contents) = small_house(2, 1);
-    let mut walk = walk_of(&house, &contents);
+    let mut walk = walk_of(house, &contents);
     let (id, portal) = (0..)
         .map(PortalId)
         .zip(&house.interior.portals)
@@ -416,8 +416,8 @@ fn holes_are_what_is_transparent_also_where_geometry_is_mixed_in() {
 #[test]
 fn frames_do_not_depend_on_threads_or_on_what_was_drawn_before() {
     let (house, contents) = small_house(4, 3);
-    let mut first = walk_of(&house, &contents);
-    let mut other = walk_of(&house, &contents);
+    let mut first = walk_of(house, &contents);
+    let mut other = walk_of(house, &contents);
     let one = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
@@ -445,7 +445,7 @@ fn frames_do_not_depend_on_threads_or_on_what_was_drawn_before() {
 fn whatever_the_place_there_is_a_picture() {
     let (house, contents) = small_house(3, 2);
     let interior = &house.interior;
-    let mut walk = walk_of(&house, &contents);
+    let mut walk = walk_of(house, &contents);
     let mut eyes: Vec<(DVec3, DVec3)> = (0..40).map(|s| viewpoint(interior, 8 * s)).collect();
     for portal in &interior.portals {
         // Edge on, on its corner and its side.

@@ -11,7 +11,8 @@ use render::{
     Frame, Lumigraph, Method, PhotoStore, RenderError, SourceView, TriangulatedField, cpu, field,
     reference,
 };
-use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// The graphics device, one for all tests of a program. `None`, said aloud, where no
 /// driver answers, unless the environment has `LUMIGRAPH_REQUIRE_GPU=1`.
@@ -91,6 +92,7 @@ pub(crate) fn pinhole(center: DVec3, target: DVec3, focal: f64, size: (u32, u32)
 }
 
 /// A dataset's scene, its views and the photos taken there.
+#[derive(Clone)]
 pub(crate) struct Shot {
     pub(crate) dataset: Dataset,
     pub(crate) views: Vec<View>,
@@ -102,6 +104,20 @@ pub(crate) struct Shot {
 impl Shot {
     /// A dataset at 160 × 120, seen through another lens where one is given.
     pub(crate) fn of(name: &str, views: usize, lens: Option<Lens>) -> Self {
+        // Those that many tests draw are made once.
+        type Made = Arc<OnceLock<Shot>>;
+        static MADE: Mutex<BTreeMap<(String, usize), Made>> = Mutex::new(BTreeMap::new());
+        if lens.is_some() {
+            return Self::made(name, views, lens);
+        }
+        let known = {
+            let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
+            Arc::clone(made.entry((name.to_owned(), views)).or_default())
+        };
+        known.get_or_init(|| Self::made(name, views, None)).clone()
+    }
+
+    fn made(name: &str, views: usize, lens: Option<Lens>) -> Self {
         let options = Options {
             size: Some((160, 120)),
             views: Some(views),

@@ -8,7 +8,7 @@ use calibrate::View;
 use proxy::interior::{Contents, Interior, Region, visible};
 use render::interior::{CellGeometry, Runs, Target};
 #[allow(unused_imports)]
-pub(crate) use shared::{random, room, small_house, view, viewpoint};
+pub(crate) use shared::{own_house, random, room, small_house, view, viewpoint};
 
 /// What portal culling leaves to draw.
 pub(crate) fn drawn<'a>(

@@ -28,7 +28,7 @@ use std::path::Path;
 
 /// A house and the images before its portals, side by side.
 struct Set {
-    house: House,
+    house: &'static House,
     contents: Contents,
     sides: Vec<Vec<Reference>>,
 }

@@ -89,7 +89,7 @@ fn what_one_sees_through_doorways_is_there() {
                 };
                 let camera = Pinhole::new(&desired).unwrap();
                 let open = window(interior, target.from, target.portal, &desired);
-                let (truth, depths) = datasets::house::render(&set.house, &desired);
+                let (truth, depths) = datasets::house::render(set.house, &desired);
                 let truth = truth.as_raw();
                 // What is beyond the portal, and seen through it.
                 let portal = interior.portal(target.portal);
