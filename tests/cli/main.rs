@@ -32,6 +32,8 @@ mod memory;
 mod names;
 mod nerfstudio;
 mod nodes;
+#[path = "../once/mod.rs"]
+mod once;
 mod opencv;
 mod path;
 mod render;

@@ -1,10 +1,10 @@
 //! Running the program, and captures to run it on.
 
+use crate::once::Once;
 use datasets::Options;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use tempfile::TempDir;
 
 /// What a run left.
@@ -94,13 +94,8 @@ pub(crate) fn with_script(folder: &Path, program: &str, script: &str) -> String 
 /// A folder with what `make` puts into it. What has the same `name` is made once, as many tests begin
 /// with it.
 pub(crate) fn folder_with(name: &str, make: impl FnOnce(&Path)) -> TempDir {
-    type Made = Arc<OnceLock<BTreeMap<PathBuf, Vec<u8>>>>;
-    static MADE: Mutex<BTreeMap<String, Made>> = Mutex::new(BTreeMap::new());
-    let known = {
-        let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
-        Arc::clone(made.entry(name.to_owned()).or_default())
-    };
-    let made = known.get_or_init(|| {
+    static MADE: Once<String, BTreeMap<PathBuf, Vec<u8>>> = Once::new();
+    let made = MADE.get(name.to_owned(), || {
         let folder = tempfile::tempdir().unwrap();
         make(folder.path());
         files(folder.path())

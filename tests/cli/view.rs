@@ -1,6 +1,7 @@
 //! `lumigraph view` in a real window on a virtual screen, with real keys and a real mouse.
 
-use crate::run::{lumigraph, with_generated, with_wall};
+use crate::interior::with_house;
+use crate::run::{lumigraph, with_wall};
 use crate::screen::{SIZE, Screen, Window, has_tools, is_settled, pixels, says, triple};
 use calibrate::{Camera, Lens, Rigid3};
 use glam::{DVec2, DVec3};
@@ -303,10 +304,6 @@ fn door(interior: &Interior) -> &Portal {
             && corners.iter().any(|c| c.dot(interior.up).abs() < 1e-6)
     };
     interior.portals.iter().find(is_door).unwrap()
-}
-
-fn with_house() -> TempDir {
-    with_generated("house --rooms 2 --triangles 1 -o house")
 }
 
 #[test]

@@ -24,6 +24,8 @@ mod mesh_obj;
 mod mesh_ply;
 mod model_files;
 mod model_looks;
+#[path = "../../../tests/once/mod.rs"]
+mod once;
 mod portals;
 mod room;
 mod strays;

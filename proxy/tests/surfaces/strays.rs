@@ -166,8 +166,8 @@ fn fitted_as_metres(mut model: Model, times: f64) -> (Interior, Vec<InteriorWarn
 
 #[test]
 fn what_stays_hidden_of_a_house_whose_units_are_no_metres_ends_the_fitting() {
-    let (house, _) = house::own_house(2, 1);
-    let (in_feet, warnings) = fitted_as_metres(house.model, 3.28084);
+    let (house, _) = small_house(2, 1);
+    let (in_feet, warnings) = fitted_as_metres(house.model.clone(), 3.28084);
     in_feet.check().unwrap();
     let told = InteriorWarning::TallWalls(6.0);
     assert!(warnings.contains(&told), "{warnings:?}");

@@ -39,6 +39,8 @@ mod masks;
 mod mattes;
 mod mesh;
 mod near;
+#[path = "../../../tests/once/mod.rs"]
+mod once;
 mod points;
 mod residency;
 mod soft;

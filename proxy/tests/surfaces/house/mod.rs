@@ -1,12 +1,11 @@
 //! What the tests of interiors share. Each of them uses a part.
 #![allow(dead_code)]
 
+use crate::once::Once;
 use calibrate::{Lens, Pixel, Rigid3, View};
 use datasets::house::{House, HouseOptions, house};
 use glam::{DVec2, DVec3};
 use proxy::interior::{CellId, Contents, Interior, Region, RoomBox, Visibility};
-use std::collections::BTreeMap;
-use std::sync::{Mutex, OnceLock, PoisonError};
 
 pub(crate) fn view(eye: DVec3, target: DVec3, [width, height]: [u32; 2]) -> View {
     let size = DVec2::new(f64::from(width), f64::from(height));
@@ -59,14 +58,8 @@ pub(crate) fn viewpoint(interior: &Interior, seed: u64) -> (DVec3, DVec3) {
 
 /// A house of few triangles and what its cells contain: made once, as many tests walk through the same.
 pub(crate) fn small_house(rooms: usize, seed: u32) -> (&'static House, Contents) {
-    type Made = &'static OnceLock<(House, Contents)>;
-    static MADE: Mutex<BTreeMap<(usize, u32), Made>> = Mutex::new(BTreeMap::new());
-    let known: Made = {
-        let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
-        let entry = made.entry((rooms, seed));
-        entry.or_insert_with(|| Box::leak(Box::default()))
-    };
-    let (house, contents) = known.get_or_init(|| own_house(rooms, seed));
+    static MADE: Once<(usize, u32), (House, Contents)> = Once::new();
+    let (house, contents) = MADE.get((rooms, seed), || own_house(rooms, seed));
     (house, contents.clone())
 }
 

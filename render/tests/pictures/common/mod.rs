@@ -1,6 +1,7 @@
 //! What the integration tests share. Each of them uses a part.
 #![allow(dead_code)]
 
+use crate::once::Once;
 use calibrate::{Lens, Rigid3, View};
 use datasets::{Dataset, Options};
 use glam::{DQuat, DVec2, DVec3};
@@ -11,8 +12,7 @@ use render::{
     Frame, Lumigraph, Method, PhotoStore, RenderError, SourceView, TriangulatedField, cpu, field,
     reference,
 };
-use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// The graphics device, one for all tests of a program. `None`, said aloud, where no
 /// driver answers, unless the environment has `LUMIGRAPH_REQUIRE_GPU=1`.
@@ -104,17 +104,12 @@ pub(crate) struct Shot {
 impl Shot {
     /// A dataset at 160 × 120, seen through another lens where one is given.
     pub(crate) fn of(name: &str, views: usize, lens: Option<Lens>) -> Self {
-        // Those that many tests draw are made once.
-        type Made = Arc<OnceLock<Shot>>;
-        static MADE: Mutex<BTreeMap<(String, usize), Made>> = Mutex::new(BTreeMap::new());
+        static MADE: Once<(String, usize), Shot> = Once::new();
         if lens.is_some() {
             return Self::made(name, views, lens);
         }
-        let known = {
-            let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
-            Arc::clone(made.entry((name.to_owned(), views)).or_default())
-        };
-        known.get_or_init(|| Self::made(name, views, None)).clone()
+        let known = MADE.get((name.to_owned(), views), || Self::made(name, views, None));
+        known.clone()
     }
 
     fn made(name: &str, views: usize, lens: Option<Lens>) -> Self {
